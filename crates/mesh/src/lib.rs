@@ -1,0 +1,23 @@
+//! Triangle meshes for engineering parts.
+//!
+//! Connectivity stands apart from positions: a [`TriangleMesh`] is two flat arrays, a [`Connectivity`] is derived
+//! from its triangles alone and stays valid while vertices move. A [`Part`] is a mesh with everything topipe knows
+//! about it: which faces the optimizer was not allowed to touch, which regions are planes or cylinders, which edges
+//! are features, which vertices are frozen, and where each vertex came from.
+//!
+//! Lengths are in millimetres once a mesh has been imported; nothing in this crate depends on that.
+
+pub mod connectivity;
+pub mod ids;
+pub mod measures;
+pub mod part;
+pub mod triangle_mesh;
+
+pub use connectivity::{Connectivity, ConnectivityError};
+pub use glam::DVec3;
+pub use ids::{FaceId, HalfEdgeId, RegionId, VertexId};
+pub use part::{
+    Design, FeatureEdge, FeatureKind, ImportRecord, Part, Provenance, Region, RegionShape, Repair,
+    SmoothingRecord,
+};
+pub use triangle_mesh::TriangleMesh;

@@ -1,0 +1,1 @@
+//! Quadrilateral layout: dual macro-triangles, disk maps, minimum-weight perfect matching.

@@ -1,0 +1,1 @@
+//! A small deterministic software renderer for triangle meshes.

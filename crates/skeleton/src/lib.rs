@@ -1,0 +1,1 @@
+//! Curve skeletons of beam-like parts.

@@ -1,0 +1,1 @@
+//! Mesh smoothing that keeps volume, holes and flat faces.

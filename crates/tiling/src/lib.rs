@@ -1,0 +1,1 @@
+//! Augmented Voronoi tessellation of a triangle mesh.

@@ -1,0 +1,1 @@
+//! Every figure of report.json, computed from artifacts alone.
