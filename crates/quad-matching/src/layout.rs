@@ -1,0 +1,80 @@
+//! The quadrilateral layout: macro-vertices, macro-edges and macro-quads over a refined mesh.
+
+use serde::{Deserialize, Serialize};
+use topipe_mesh::{FeatureKind, Part, VertexId};
+
+/// A side of a macro-quad: a macro-edge and the direction in which the quad runs along it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Side {
+    /// Index into [`QuadLayout::edges`].
+    pub edge: u32,
+    /// True when the quad runs from the edge's last vertex to its first.
+    pub reversed: bool,
+}
+
+/// A macro-edge: a path of mesh edges between two macro-vertices.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MacroEdge {
+    /// The macro-vertices at its two ends, as indices into [`QuadLayout::vertices`].
+    pub ends: [u32; 2],
+    /// The mesh vertices along it, ends included.
+    pub path: Vec<VertexId>,
+    /// Set when the whole path follows feature edges.
+    pub feature: Option<FeatureKind>,
+}
+
+/// A partition of a part's mesh into quadrilaterals.
+///
+/// Guarantees: each macro-edge is a path of mesh edges and is used by exactly two sides, in opposite directions;
+/// the faces of each quad form a disk bounded by its four sides; V - E + F of the layout equals that of the mesh.
+/// Not guaranteed: that two quads share at most one side (they are addressed by sides, so that is harmless).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct QuadLayout {
+    /// The part; its mesh is refined so that macro-edges are mesh edges. Provenance refers to the tiling's mesh.
+    pub part: Part,
+    /// The mesh vertex of each macro-vertex.
+    pub vertices: Vec<VertexId>,
+    /// The macro-edges.
+    pub edges: Vec<MacroEdge>,
+    /// The four sides of each quad, counter-clockwise seen from outside.
+    pub quads: Vec<[Side; 4]>,
+    /// The quad of each mesh face.
+    pub quad_of_face: Vec<u32>,
+    /// Number of tiles of the tessellation this layout is the dual of.
+    pub tiles: u32,
+    /// Number of macro-triangles that were matched.
+    pub macro_triangles: u32,
+}
+
+impl QuadLayout {
+    /// The macro-vertex a side starts from.
+    #[inline]
+    pub fn start(&self, side: Side) -> u32 {
+        self.edges[side.edge as usize].ends[side.reversed as usize]
+    }
+
+    /// The mesh vertices along a side, in the direction of the quad.
+    pub fn path(&self, side: Side) -> Vec<VertexId> {
+        let mut path = self.edges[side.edge as usize].path.clone();
+        if side.reversed {
+            path.reverse();
+        }
+        path
+    }
+
+    /// The macro-vertices at the corners of a quad, counter-clockwise; corner `k` starts side `k`.
+    pub fn corners(&self, quad: usize) -> [u32; 4] {
+        self.quads[quad].map(|side| self.start(side))
+    }
+
+    /// The valence of each macro-vertex: the number of quad corners at it.
+    pub fn valences(&self) -> Vec<u32> {
+        let mut valences = vec![0; self.vertices.len()];
+        for quad in 0..self.quads.len() {
+            for corner in self.corners(quad) {
+                valences[corner as usize] += 1;
+            }
+        }
+        valences
+    }
+}

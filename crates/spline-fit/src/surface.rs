@@ -1,0 +1,112 @@
+//! The spline surface: vertices, edge curves and tensor-product patches that share them.
+
+use crate::basis::Basis;
+use serde::{Deserialize, Serialize};
+use topipe_mesh::{DVec3, FeatureKind};
+
+/// A side of a patch: an edge curve and the direction in which the patch runs along it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PatchSide {
+    /// Index into [`SplineSurface::edges`].
+    pub edge: u32,
+    /// True when the patch runs from the curve's end to its start.
+    pub reversed: bool,
+}
+
+/// A B-spline curve between two vertices.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EdgeCurve {
+    /// Start and end, as indices into [`SplineSurface::vertices`].
+    pub ends: [u32; 2],
+    /// Degree and knots.
+    pub basis: Basis,
+    /// Control points; the first and last are the positions of the end vertices, bit for bit.
+    pub control: Vec<DVec3>,
+    /// Set when the curve follows a feature of the mesh.
+    pub feature: Option<FeatureKind>,
+}
+
+/// A tensor-product B-spline patch over [0, 1]^2.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Patch {
+    /// Its four sides, counter-clockwise from outside: v = 0 (u rising), u = 1 (v rising), v = 1 (u falling),
+    /// u = 0 (v falling).
+    pub sides: [PatchSide; 4],
+    /// Degree and knots in u.
+    pub basis_u: Basis,
+    /// Degree and knots in v.
+    pub basis_v: Basis,
+    /// Control points, u fastest: point (i, j) at `i + j * basis_u.len()`. The border rows equal those of the edge
+    /// curves bit for bit.
+    pub control: Vec<DVec3>,
+}
+
+/// A closed surface of patches. Each edge curve is shared by exactly two patches that run along it in opposite
+/// directions, and S_u x S_v points out of the material.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SplineSurface {
+    /// Corner points, mm.
+    pub vertices: Vec<DVec3>,
+    /// Edge curves.
+    pub edges: Vec<EdgeCurve>,
+    /// Patches.
+    pub patches: Vec<Patch>,
+}
+
+/// Position and first derivatives of a patch at a parameter.
+#[derive(Debug, Clone, Copy)]
+pub struct SurfacePoint {
+    /// S, mm.
+    pub position: DVec3,
+    /// S_u.
+    pub du: DVec3,
+    /// S_v.
+    pub dv: DVec3,
+}
+
+impl SurfacePoint {
+    /// The unit normal, or zero where the patch is singular.
+    pub fn normal(&self) -> DVec3 {
+        self.du.cross(self.dv).normalize_or_zero()
+    }
+}
+
+impl EdgeCurve {
+    /// The point at `t`.
+    pub fn position(&self, t: f64) -> DVec3 {
+        let local = self.basis.evaluate(t);
+        (0..local.count).map(|k| local.derivatives[0][k] * self.control[local.first + k]).sum()
+    }
+}
+
+impl Patch {
+    /// Position and first derivatives at `(u, v)`.
+    pub fn evaluate(&self, u: f64, v: f64) -> SurfacePoint {
+        let (bu, bv) = (self.basis_u.evaluate(u), self.basis_v.evaluate(v));
+        let width = self.basis_u.len();
+        let (mut position, mut du, mut dv) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        for j in 0..bv.count {
+            let row = (bv.first + j) * width + bu.first;
+            let (mut value, mut slope) = (DVec3::ZERO, DVec3::ZERO);
+            for i in 0..bu.count {
+                let c = self.control[row + i];
+                value += bu.derivatives[0][i] * c;
+                slope += bu.derivatives[1][i] * c;
+            }
+            position += bv.derivatives[0][j] * value;
+            du += bv.derivatives[0][j] * slope;
+            dv += bv.derivatives[1][j] * value;
+        }
+        SurfacePoint { position, du, dv }
+    }
+
+    /// The parameters of the point at fraction `t` of side `side`, in the direction of the patch.
+    pub fn side_parameters(side: usize, t: f64) -> (f64, f64) {
+        match side {
+            0 => (t, 0.0),
+            1 => (1.0, t),
+            2 => (1.0 - t, 1.0),
+            _ => (0.0, 1.0 - t),
+        }
+    }
+}
