@@ -11,6 +11,7 @@ pub mod connectivity;
 pub mod ids;
 pub mod measures;
 pub mod part;
+pub mod refine;
 pub mod triangle_mesh;
 
 pub use connectivity::{Connectivity, ConnectivityError};
