@@ -1,0 +1,47 @@
+//! What a user may set.
+
+use crate::TilingError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the tessellation. All are dimensionless: a part in metres behaves as in millimetres.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Parameters {
+    /// Number of tiles to aim at (more are added where the topology asks for them); 0 = from `tile_size`.
+    pub tiles: u32,
+    /// Distance between neighbouring sites over the mean wall thickness (twice the volume over the area).
+    pub tile_size: f64,
+    /// Rounds in which each free site moves to the centroid of its tile (Lloyd relaxation).
+    pub lloyd_rounds: u32,
+    /// Place sites along feature edges, so that patch borders can follow them.
+    pub follow_features: bool,
+    /// Least number of faces a tile should have; the mesh is refined where it is coarser.
+    pub faces_per_tile: u32,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self { tiles: 0, tile_size: 4.0, lloyd_rounds: 2, follow_features: true, faces_per_tile: 24 }
+    }
+}
+
+impl Parameters {
+    /// Checks the ranges.
+    pub fn validate(&self) -> Result<(), TilingError> {
+        let refuse = |field, value: String, range| Err(TilingError::Parameter { field, value, range });
+        if !(self.tile_size > 0.0 && self.tile_size <= 1e3) {
+            return refuse("tile_size", self.tile_size.to_string(), "greater than 0, at most 1000");
+        }
+        if self.lloyd_rounds > 100 {
+            return refuse("lloyd_rounds", self.lloyd_rounds.to_string(), "0 to 100");
+        }
+        if !(4..=10_000).contains(&self.faces_per_tile) {
+            return refuse("faces_per_tile", self.faces_per_tile.to_string(), "4 to 10000");
+        }
+        if (1..4).contains(&self.tiles) {
+            return refuse("tiles", self.tiles.to_string(), "0, or at least 4");
+        }
+        Ok(())
+    }
+}
