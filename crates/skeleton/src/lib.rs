@@ -1,1 +1,64 @@
 //! Curve skeletons of beam-like parts.
+//!
+//! Two methods, see [`Method`]:
+//! - `identifier-box`: the axis-aligned box that marches from the borders of design and non-design and collects
+//!   nodes (the thesis on skeletonization of beam-like topology optimization results, section 3.4), in its plain form.
+//! - `marching-sections`: plane sections across the branches of the Reeb graph of the geodesic distance from the
+//!   interfaces, each point at the area centroid of its section, junctions where the axes of their branches meet.
+//!
+//! Guarantees: an oriented closed mesh gives a skeleton or a named error, never a panic, in a bounded number of
+//! steps; equal input gives equal bytes for any number of threads. Each interface has one point, and the interfaces
+//! of one non-design part are joined in a `non-design` point.
+//!
+//! Non-guarantees: the identifier box depends on the orientation, misses thin slanted branches and does not promise
+//! a cycle per handle. Parts that are not beams get a skeleton all the same; whether it means anything is for
+//! validation to say. Holes that a non-design part has of its own, and cavities, are not skeletonized; remarks say so.
+//!
+//! ```
+//! use topipe_mesh::{Part, TriangleMesh};
+//! use topipe_progress::Progress;
+//! use topipe_skeleton::{Parameters, SkeletonError, skeletonize};
+//! let empty = Part::new(TriangleMesh::default());
+//! let result = skeletonize(&empty, &Parameters::default(), &Progress::silent());
+//! assert_eq!(result, Err(SkeletonError::Empty));
+//! ```
+
+mod error;
+mod identifier_box;
+mod inside;
+mod interface;
+mod non_design;
+mod parameters;
+mod skeleton;
+
+pub use error::SkeletonError;
+pub use parameters::{Method, Parameters};
+pub use skeleton::{GraphMeasures, PointKind, Section, Skeleton};
+
+use topipe_mesh::{Design, Part};
+use topipe_progress::Progress;
+
+/// Finds the skeleton of the design region of `part`.
+///
+/// The mesh should be smoothed and must be closed; `part.design` marks the non-design faces.
+pub fn skeletonize(
+    part: &Part,
+    parameters: &Parameters,
+    progress: &Progress,
+) -> Result<Skeleton, SkeletonError> {
+    parameters.check()?;
+    let connectivity = interface::connect(part)?;
+    progress.check()?;
+    if !part.design.contains(&Design::Design) {
+        return Err(SkeletonError::NoDesign);
+    }
+    let sets = interface::Sets::find(part, &connectivity);
+    match parameters.method {
+        Method::IdentifierBox => {
+            identifier_box::skeletonize(part, parameters, &connectivity, &sets, progress)
+        }
+        Method::MarchingSections => {
+            identifier_box::skeletonize(part, parameters, &connectivity, &sets, progress)
+        }
+    }
+}
