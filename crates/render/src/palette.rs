@@ -1,0 +1,101 @@
+//! Colours for tiles, and for numbers.
+
+use crate::Color;
+use std::collections::BTreeSet;
+use topipe_mesh::TriangleMesh;
+
+/// Twelve light colours of similar weight: twelve hues, alternating in lightness, so that they differ in print too.
+fn tile_colors() -> [Color; 12] {
+    std::array::from_fn(|k| {
+        // Five steps of 30 degrees at a time visit all twelve hues and keep consecutive colours far apart.
+        let hue = (k * 150 % 360) as f64 + 15.0;
+        Color::from_oklch([0.82, 0.72, 0.88][k % 3], [0.09, 0.11, 0.07][k % 3], hue)
+    })
+}
+
+/// One colour per id, such that ids that touch across an edge of `mesh` differ wherever twelve colours suffice.
+///
+/// `id_of_face` holds one id per face; the result has one more entry than the largest of them. `u32::MAX` stands
+/// for "none". Greedy: each id takes the colour, of those not seen at its neighbours, that was used least so far.
+pub fn categorical(mesh: &TriangleMesh, id_of_face: &[u32]) -> Vec<Color> {
+    let colors = tile_colors();
+    let count = id_of_face.iter().filter(|&&id| id != u32::MAX).max().map_or(0, |&id| id as usize + 1);
+    let mut sides: Vec<([u32; 2], u32)> = Vec::with_capacity(mesh.face_count() * 3);
+    for (triangle, &id) in mesh.triangles.iter().zip(id_of_face) {
+        for k in 0..3 {
+            let (a, b) = (triangle[k].0, triangle[(k + 1) % 3].0);
+            sides.push(([a.min(b), a.max(b)], id));
+        }
+    }
+    sides.sort_unstable();
+    let mut neighbors = vec![BTreeSet::new(); count];
+    for pair in sides.windows(2) {
+        let (a, b) = (pair[0].1, pair[1].1);
+        if pair[0].0 == pair[1].0 && a != b && a != u32::MAX && b != u32::MAX {
+            neighbors[a as usize].insert(b as usize);
+            neighbors[b as usize].insert(a as usize);
+        }
+    }
+    let mut chosen = vec![usize::MAX; count];
+    let mut used = [0usize; 12];
+    for id in 0..count {
+        let taken: BTreeSet<usize> = neighbors[id].iter().map(|&n| chosen[n]).collect();
+        let free = (0..colors.len()).filter(|c| !taken.contains(c)).min_by_key(|&c| used[c]);
+        let color = free.unwrap_or(id % colors.len());
+        chosen[id] = color;
+        used[color] += 1;
+    }
+    chosen.into_iter().map(|c| colors[c]).collect()
+}
+
+/// The colours of the faces of `mesh` by [`categorical`]; faces without an id are grey.
+pub fn categorical_faces(mesh: &TriangleMesh, id_of_face: &[u32]) -> Vec<Color> {
+    let colors = categorical(mesh, id_of_face);
+    id_of_face.iter().map(|&id| colors.get(id as usize).copied().unwrap_or(Color([190, 190, 190]))).collect()
+}
+
+/// A colour for a number from 0 to 1: from dark violet over blue and green to light yellow, with a lightness that
+/// rises evenly, so that the order is seen without a legend and in black and white. Not a number: grey.
+pub fn sequential(t: f64) -> Color {
+    if t.is_nan() {
+        return Color([160, 160, 160]);
+    }
+    let t = t.clamp(0.0, 1.0);
+    // The hue turns faster at the light end, where the eye sees the steps between green and yellow less.
+    let hue = 305.0 - 195.0 * (0.75 * t + 0.25 * t * t);
+    let chroma = 0.10 + 0.16 * t * (1.0 - t) + 0.06 * t;
+    Color::from_oklch(0.30 + 0.62 * t, chroma, hue)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_that_touch_differ() {
+        // A strip of quads of two triangles each, every quad a tile of its own.
+        let n = 40u32;
+        let positions = (0..=n).flat_map(|i| [[f64::from(i), 0.0, 0.0], [f64::from(i), 1.0, 0.0]]).collect();
+        let triangles =
+            (0..n).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 1], [2 * i + 1, 2 * i + 2, 2 * i + 3]]).collect();
+        let mesh = TriangleMesh::from_arrays(positions, triangles);
+        let ids: Vec<u32> = (0..n).flat_map(|i| [i, i]).collect();
+        let colors = categorical(&mesh, &ids);
+        assert_eq!(colors.len(), n as usize);
+        assert!(colors.windows(2).all(|pair| pair[0] != pair[1]));
+        assert!(colors.iter().map(|c| c.0).collect::<BTreeSet<_>>().len() == 12, "all colours are used");
+    }
+
+    #[test]
+    fn sequential_rises_in_lightness() {
+        let luminance = |t: f64| {
+            let [r, g, b] = sequential(t).to_linear();
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        for k in 0..32 {
+            assert!(luminance(f64::from(k) / 32.0) < luminance(f64::from(k + 1) / 32.0), "at {k}");
+        }
+        assert_eq!(sequential(-1.0), sequential(0.0));
+        assert_eq!(sequential(2.0), sequential(1.0));
+    }
+}
