@@ -1,0 +1,134 @@
+//! Smooths OFF files and prints what was found and how the surface changed.
+//!
+//! `cargo run --release -p topipe-smoothing --example measure -- CASE.off ...`, with `CASE.labels.csv` beside each.
+//! With `--write DIR`, the result of each is written there, with one line per face saying its region.
+
+use std::fmt::Write as _;
+use std::time::Instant;
+use topipe_mesh::{Connectivity, Design, Part, RegionShape, TriangleMesh};
+use topipe_progress::Progress;
+use topipe_smoothing::{Parameters, smooth};
+
+fn read_off(text: &str) -> TriangleMesh {
+    let mut numbers = text.split_ascii_whitespace().skip(1);
+    let mut next = || numbers.next().expect("a complete OFF file");
+    let (vertices, faces) = (next().parse().expect("count"), next().parse().expect("count"));
+    next();
+    let positions = (0..vertices).map(|_| [(); 3].map(|_| next().parse().expect("coordinate"))).collect();
+    let triangles = (0..faces)
+        .map(|_| {
+            next();
+            [(); 3].map(|_| next().parse().expect("index"))
+        })
+        .collect();
+    TriangleMesh::from_arrays(positions, triangles)
+}
+
+/// Faces whose normal is more than 120 degrees from the mean of their neighbours', and the dihedral histogram.
+fn quality(mesh: &TriangleMesh) -> String {
+    let c = Connectivity::build(mesh).expect("a manifold");
+    let mut flipped = 0;
+    for f in mesh.faces() {
+        let n: topipe_mesh::DVec3 = (0..3).map(|k| mesh.normal(c.neighbor(f, k))).sum();
+        if mesh.normal(f).dot(n.normalize_or_zero()) < -0.5 {
+            flipped += 1;
+        }
+    }
+    let mut bins = [0usize; 5];
+    let mut largest: f64 = 0.0;
+    for h in c.edges() {
+        let cosine = mesh.normal(h.face()).dot(mesh.normal(c.twin(h).face())).clamp(-1.0, 1.0);
+        let angle = cosine.acos().to_degrees();
+        largest = largest.max(angle);
+        bins[[20.0, 45.0, 80.0, 120.0].iter().filter(|&&b| angle >= b).count()] += 1;
+    }
+    format!("folded {flipped}, dihedral <20/45/80/120/more {bins:?}, largest {largest:.1}")
+}
+
+fn main() {
+    let mut write = None;
+    let mut parameters = Parameters::default();
+    let mut arguments = std::env::args().skip(1);
+    while let Some(path) = arguments.next() {
+        let mut value = || arguments.next().expect("a value");
+        match path.as_str() {
+            "--write" => write = Some(value()),
+            "--alpha" => parameters.alpha = value().parse().expect("a number"),
+            "--beta" => parameters.beta = value().parse().expect("a number"),
+            "--tolerance" => parameters.tolerance = value().parse().expect("a number"),
+            "--floor" => parameters.weight_floor = value().parse().expect("a number"),
+            "--iterations" => parameters.iterations = Some(value().parse().expect("a number")),
+            "--no-slide" => parameters.slide_outlines = false,
+            _ => case(&path, &parameters, write.as_deref()),
+        }
+    }
+}
+
+fn case(path: &str, parameters: &Parameters, write: Option<&str>) {
+    let mesh = read_off(&std::fs::read_to_string(path).expect("a readable file"));
+    let mut part = Part::new(mesh);
+    if let Ok(labels) = std::fs::read_to_string(path.replace(".off", ".labels.csv")) {
+        for (design, label) in part.design.iter_mut().zip(labels.split_ascii_whitespace()) {
+            if label == "1" {
+                *design = Design::NonDesign;
+            }
+        }
+    }
+    println!("{path}: {} faces", part.mesh.face_count());
+    let start = Instant::now();
+    let smoothed = match smooth(&part, parameters, &Progress::silent()) {
+        Ok(smoothed) => smoothed,
+        Err(error) => return println!("  {error}"),
+    };
+    let seconds = start.elapsed().as_secs_f64();
+    for (i, region) in smoothed.regions.iter().enumerate() {
+        let faces = smoothed.region_of_face.iter().filter(|r| r.index() == i).count();
+        match region.shape {
+            RegionShape::Plane { point, normal } => println!(
+                "  plane {:.4} at {:.4}: {faces} faces, {:.2} mm2, residual {:.1e}",
+                normal,
+                normal.dot(point),
+                region.area,
+                region.residual
+            ),
+            RegionShape::Cylinder { point, axis, radius, .. } => println!(
+                "  hole d {:.6} axis {:.4} at {:.3}: {faces} faces, residual {:.1e}",
+                2.0 * radius,
+                axis,
+                point,
+                region.residual
+            ),
+        }
+    }
+    let record = smoothed.smoothing.as_ref().expect("a record");
+    let frozen = smoothed.frozen.iter().filter(|f| **f).count();
+    println!(
+        "  {} iterations, converged {}, {seconds:.3} s, frozen {frozen} of {}, volume error {:.1e}, {} feature edges",
+        record.iterations,
+        record.converged,
+        smoothed.frozen.len(),
+        smoothed.mesh.volume() / part.mesh.volume() - 1.0,
+        smoothed.feature_edges.len(),
+    );
+    println!("  before: {}", quality(&part.mesh));
+    println!("  after:  {}", quality(&smoothed.mesh));
+    if let Some(directory) = write {
+        let name = path.rsplit('/').next().unwrap_or(path);
+        let mut text = format!("OFF\n{} {} 0\n", smoothed.mesh.vertex_count(), smoothed.mesh.face_count());
+        for p in &smoothed.mesh.positions {
+            let _ = writeln!(text, "{} {} {}", p.x, p.y, p.z);
+        }
+        for t in &smoothed.mesh.triangles {
+            let _ = writeln!(text, "3 {} {} {}", t[0].0, t[1].0, t[2].0);
+        }
+        std::fs::write(format!("{directory}/{name}"), text).expect("a writable directory");
+        let regions: String = smoothed.region_of_face.iter().map(|r| format!("{}\n", r.0 as i32)).collect();
+        std::fs::write(format!("{directory}/{name}.regions"), regions).expect("a writable directory");
+        let edges: String = smoothed
+            .feature_edges
+            .iter()
+            .map(|e| format!("{} {} {:?}\n", e.vertices[0].0, e.vertices[1].0, e.kind))
+            .collect();
+        std::fs::write(format!("{directory}/{name}.edges"), edges).expect("a writable directory");
+    }
+}

@@ -1,0 +1,172 @@
+//! The part of every method that touches memory: neighbours, weights, umbrella steps, sums in fixed order.
+//!
+//! Vertices are independent within a pass, so any split between threads gives the same bits; sums are made per chunk
+//! of a fixed size and then added in order.
+
+use rayon::prelude::*;
+use topipe_mesh::DVec3;
+
+/// Vertices per task: positions of one chunk (96 KiB) fit the second-level cache.
+pub(crate) const CHUNK: usize = 4096;
+
+/// Who pulls on whom. The row of a frozen vertex is empty: it has no umbrella and never moves.
+pub(crate) struct Domain {
+    /// Row offsets, one more than vertices.
+    pub(crate) start: Vec<u32>,
+    /// The vertices that pull, row after row.
+    pub(crate) neighbors: Vec<u32>,
+    /// Vertices that may move in a plane only, in order.
+    pub(crate) slides: Vec<Slide>,
+}
+
+/// A vertex on the outline of a flat face: it moves in the plane through its first position.
+pub(crate) struct Slide {
+    pub(crate) vertex: u32,
+    pub(crate) normal: DVec3,
+}
+
+impl Domain {
+    /// The vertices that pull on `vertex`.
+    #[inline]
+    pub(crate) fn row(&self, vertex: usize) -> &[u32] {
+        &self.neighbors[self.start[vertex] as usize..self.start[vertex + 1] as usize]
+    }
+
+    /// Number of vertices that may move.
+    pub(crate) fn free_count(&self) -> usize {
+        self.start.windows(2).filter(|w| w[0] < w[1]).count()
+    }
+
+    /// Sets `target[v] = f(v, row)` for vertices with a row and `target[v] = fixed(v)` for the others.
+    #[inline]
+    pub(crate) fn sweep(
+        &self,
+        target: &mut [DVec3],
+        fixed: impl Fn(usize) -> DVec3 + Sync,
+        f: impl Fn(usize, &[u32], usize) -> DVec3 + Sync,
+    ) {
+        target.par_chunks_mut(CHUNK).enumerate().for_each(|(k, chunk)| {
+            let base = k * CHUNK;
+            let mut begin = self.start[base] as usize;
+            for (i, slot) in chunk.iter_mut().enumerate() {
+                let end = self.start[base + i + 1] as usize;
+                *slot = if begin == end {
+                    fixed(base + i)
+                } else {
+                    f(base + i, &self.neighbors[begin..end], begin)
+                };
+                begin = end;
+            }
+        });
+    }
+
+    /// Takes back what a step moved the sliding vertices out of their planes.
+    pub(crate) fn project(&self, original: &[DVec3], positions: &mut [DVec3]) {
+        for slide in &self.slides {
+            let v = slide.vertex as usize;
+            positions[v] -= slide.normal * slide.normal.dot(positions[v] - original[v]);
+        }
+    }
+}
+
+/// The mean of the neighbours less the vertex.
+#[inline]
+pub(crate) fn umbrella(positions: &[DVec3], vertex: usize, row: &[u32]) -> DVec3 {
+    mean(positions, row) - positions[vertex]
+}
+
+/// The mean of some values.
+#[inline]
+pub(crate) fn mean(values: &[DVec3], row: &[u32]) -> DVec3 {
+    let mut sum = DVec3::ZERO;
+    for &j in row {
+        sum += values[j as usize];
+    }
+    sum / row.len() as f64
+}
+
+/// The weighted mean of the neighbours less the vertex; the weights of a row add up to 1.
+#[inline]
+pub(crate) fn weighted_umbrella(positions: &[DVec3], vertex: usize, row: &[u32], weights: &[f64]) -> DVec3 {
+    let here = positions[vertex];
+    let mut sum = DVec3::ZERO;
+    for (&j, &w) in row.iter().zip(weights) {
+        sum += w * (positions[j as usize] - here);
+    }
+    sum
+}
+
+/// Scale-dependent umbrella weights: `1 / length` over their sum in the row.
+///
+/// Divided by the sum of the lengths, as printed in the paper, they would carry a unit: the step would go with
+/// 1 / length^2 and the same part in metres would blow up.
+///
+/// Lengths below `floor` of the row's mean count as that. Without it the two ends of a very short edge see nothing
+/// but each other, and with `lambda` > 0.5 change places: on the bracket (shortest edge 1/28 of the mean) that
+/// turned triangles over.
+pub(crate) fn scale_dependent(domain: &Domain, positions: &[DVec3], floor: f64, weights: &mut Vec<f64>) {
+    weights.resize(domain.neighbors.len(), 0.0);
+    // Rows differ in length, so chunks of vertices are cut out of the flat array by hand.
+    let mut tasks = Vec::with_capacity(positions.len() / CHUNK + 1);
+    let mut rest = weights.as_mut_slice();
+    for base in (0..positions.len()).step_by(CHUNK) {
+        let end = (base + CHUNK).min(positions.len());
+        let (task, tail) = rest.split_at_mut((domain.start[end] - domain.start[base]) as usize);
+        tasks.push((base..end, task));
+        rest = tail;
+    }
+    tasks.into_par_iter().for_each(|(vertices, task)| {
+        let first = domain.start[vertices.start] as usize;
+        for v in vertices {
+            let row = domain.row(v);
+            if row.is_empty() {
+                continue;
+            }
+            let out = &mut task[domain.start[v] as usize - first..domain.start[v + 1] as usize - first];
+            let mut total = 0.0;
+            for (w, &j) in out.iter_mut().zip(row) {
+                *w = positions[v].distance(positions[j as usize]);
+                total += *w;
+            }
+            if total <= 0.0 {
+                // All neighbours in one place: any weights do.
+                out.fill(1.0 / row.len() as f64);
+                continue;
+            }
+            // The second bound keeps 1 / length finite for a floor of 0.
+            let shortest = (floor * total / row.len() as f64).max(total * 1e-9);
+            let mut sum = 0.0;
+            for w in out.iter_mut() {
+                *w = 1.0 / w.max(shortest);
+                sum += *w;
+            }
+            for w in out.iter_mut() {
+                *w /= sum;
+            }
+        }
+    });
+}
+
+/// How far two states of the mesh are apart.
+pub(crate) struct Change {
+    /// Sum of the squared distances.
+    pub(crate) squares: f64,
+    /// Sum of the distances.
+    pub(crate) distances: f64,
+}
+
+/// Sums distances between `a` and `b`, in fixed order.
+pub(crate) fn change(a: &[DVec3], b: &[DVec3]) -> Change {
+    let partial: Vec<(f64, f64)> = a
+        .par_chunks(CHUNK)
+        .zip(b.par_chunks(CHUNK))
+        .map(|(a, b)| {
+            a.iter().zip(b).fold((0.0, 0.0), |(squares, distances), (p, q)| {
+                let square = p.distance_squared(*q);
+                (squares + square, distances + square.sqrt())
+            })
+        })
+        .collect();
+    let (squares, distances) = partial.iter().fold((0.0, 0.0), |(s, d), p| (s + p.0, d + p.1));
+    Change { squares, distances }
+}

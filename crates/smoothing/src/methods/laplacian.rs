@@ -1,0 +1,19 @@
+//! Laplacian smoothing: `next = c + lambda (mean_j c_j - c)`.
+//!
+//! Sorkine, "Laplacian mesh processing", 2005; Bacciaglia et al. 2021, section 2.2. Each step lowers the sum of squared
+//! edge vectors, so it converges, to a collapsed mesh where nothing is frozen.
+
+use super::Step;
+use crate::kernel::{Domain, umbrella};
+use topipe_mesh::DVec3;
+
+pub(super) struct Laplacian {
+    pub(super) lambda: f64,
+}
+
+impl Step for Laplacian {
+    fn step(&mut self, domain: &Domain, _: &[DVec3], current: &[DVec3], next: &mut [DVec3]) {
+        let lambda = self.lambda;
+        domain.sweep(next, |v| current[v], |v, row, _| current[v] + lambda * umbrella(current, v, row));
+    }
+}

@@ -1,0 +1,30 @@
+//! The methods: each is one step from a state of the mesh to the next.
+
+mod contract;
+mod hc;
+mod hc_sdu;
+mod laplacian;
+mod sdu;
+mod taubin;
+
+use crate::kernel::Domain;
+use crate::{Method, Parameters};
+use topipe_mesh::DVec3;
+
+/// One iteration of a method. It leaves vertices with empty rows where they are, bit by bit.
+pub(crate) trait Step {
+    /// Computes `next` from `current` and from the mesh before the first iteration.
+    fn step(&mut self, domain: &Domain, original: &[DVec3], current: &[DVec3], next: &mut [DVec3]);
+}
+
+/// The method that `parameters` name, ready for a mesh with these positions.
+pub(crate) fn choose(parameters: &Parameters, domain: &Domain, original: &[DVec3]) -> Box<dyn Step> {
+    match parameters.method {
+        Method::Laplacian => Box::new(laplacian::Laplacian { lambda: parameters.lambda }),
+        Method::Sdu => Box::new(sdu::Sdu::new(parameters, domain, original)),
+        Method::Hc => Box::new(hc::Hc::new(parameters, original.len())),
+        Method::Taubin => Box::new(taubin::Taubin::new(parameters, original.len())),
+        Method::HcSdu => Box::new(hc_sdu::HcSdu::new(parameters, domain, original)),
+        Method::Contract => Box::new(contract::Contract),
+    }
+}

@@ -1,0 +1,206 @@
+//! The loop: freeze, step, project, restore the volume, stop.
+
+use crate::features::{self, Features};
+use crate::kernel::{Domain, Slide, change};
+use crate::methods;
+use crate::volume::VolumeKeeper;
+use crate::{Method, Parameters, SmoothingError};
+use topipe_mesh::{Connectivity, Design, FeatureKind, Part, RegionId, SmoothingRecord};
+use topipe_progress::Progress;
+
+/// A step longer than this many mean edge lengths (root mean square) is no smoothing any more.
+const DIVERGED: f64 = 100.0;
+
+/// Smooths `part`: the same connectivity and attributes, with new positions, regions, feature edges and frozen
+/// vertices, and a record of what was done.
+///
+/// - `part` must be an oriented manifold with finite coordinates; closed, if the volume is to be kept.
+/// - `parameters` are checked first; see [`Parameters::check`].
+/// - `progress` hears of each iteration, and is asked before each whether to stop.
+///
+/// See the [crate] for guarantees.
+pub fn smooth(part: &Part, parameters: &Parameters, progress: &Progress) -> Result<Part, SmoothingError> {
+    parameters.check()?;
+    check_attributes(part)?;
+    let mesh = &part.mesh;
+    if let Some(v) = mesh.positions.iter().position(|p| !p.is_finite()) {
+        return Err(SmoothingError::NotFinite { vertex: v as u32 });
+    }
+    let connectivity = Connectivity::build(mesh)?;
+    if parameters.method == Method::Taubin && !parameters.obeys_taubin_rule() {
+        progress.remark(&format!(
+            "lambda = {} and mu = {} break Taubin's rule 0.01 < 1/lambda + 1/mu < 0.1: the part will {}",
+            parameters.lambda,
+            parameters.mu,
+            if -parameters.mu < parameters.lambda { "shrink" } else { "grow" }
+        ));
+    }
+    let features = features::detect(part, &connectivity, parameters, progress)?;
+    let mut result = part.clone();
+    let mut record =
+        SmoothingRecord { method: parameters.method.name().to_owned(), ..SmoothingRecord::default() };
+    let frozen = frozen(part, parameters, &features);
+    if parameters.most_iterations() == 0 {
+        record.converged = true;
+    } else {
+        let domain = domain(&connectivity, &features, &frozen, mesh.vertex_count());
+        iterate(part, &connectivity, &domain, parameters, progress, &mut result, &mut record)?;
+    }
+    let solid: Vec<bool> = mesh.triangles.iter().map(|t| t.iter().all(|v| frozen[v.index()])).collect();
+    result.feature_edges =
+        part.feature_edges.iter().filter(|e| e.kind == FeatureKind::User).copied().collect();
+    for edge in
+        features::feature_edges(&result.mesh, &connectivity, &features, &solid, parameters.sharp_angle)
+    {
+        if !part.feature_edges.iter().any(|e| e.kind == FeatureKind::User && e.vertices == edge.vertices) {
+            result.feature_edges.push(edge);
+        }
+    }
+    result.feature_edges.sort_unstable_by_key(|e| e.vertices);
+    result.regions = features.regions;
+    result.region_of_face = features.region_of_face;
+    result.frozen = frozen;
+    result.smoothing = Some(record);
+    Ok(result)
+}
+
+fn check_attributes(part: &Part) -> Result<(), SmoothingError> {
+    let (vertices, faces) = (part.mesh.vertex_count(), part.mesh.face_count());
+    for (what, found, expected) in [
+        ("design labels", part.design.len(), faces),
+        ("region entries", part.region_of_face.len(), faces),
+        ("frozen flags", part.frozen.len(), vertices),
+    ] {
+        if found != expected {
+            return Err(SmoothingError::Attributes { what, found, expected });
+        }
+    }
+    let missing = |r: &&RegionId| r.is_some() && r.index() >= part.regions.len();
+    if let Some(r) = part.region_of_face.iter().find(missing) {
+        let expected = r.index() + 1;
+        return Err(SmoothingError::Attributes { what: "regions", found: part.regions.len(), expected });
+    }
+    Ok(())
+}
+
+/// Which vertices must not move.
+fn frozen(part: &Part, parameters: &Parameters, features: &Features) -> Vec<bool> {
+    let mut frozen = part.frozen.clone();
+    // Contraction must be able to take flat faces with it.
+    if parameters.method != Method::Contract {
+        for (frozen, on_region) in frozen.iter_mut().zip(&features.on_region) {
+            *frozen |= on_region;
+        }
+        if parameters.slide_outlines {
+            for slide in &features.outline {
+                frozen[slide.vertex as usize] = part.frozen[slide.vertex as usize];
+            }
+        }
+    }
+    if parameters.freeze_non_design {
+        for (t, design) in part.mesh.triangles.iter().zip(&part.design) {
+            if *design == Design::NonDesign {
+                for v in t {
+                    frozen[v.index()] = true;
+                }
+            }
+        }
+    }
+    frozen
+}
+
+fn domain(connectivity: &Connectivity, features: &Features, frozen: &[bool], vertices: usize) -> Domain {
+    let (all_start, all) = connectivity.vertex_neighbors();
+    let mut start = Vec::with_capacity(vertices + 1);
+    let mut neighbors = Vec::with_capacity(all.len());
+    let mut slides = Vec::new();
+    let mut outline = features.outline.iter().peekable();
+    start.push(0);
+    for v in 0..vertices {
+        let slide = outline.next_if(|o| o.vertex as usize == v);
+        if !frozen[v] {
+            match slide {
+                // Along the outline only: its other neighbours would draw it to one side.
+                Some(o) if features.on_region[v] => {
+                    neighbors.extend(o.along);
+                    slides.push(Slide { vertex: o.vertex, normal: o.normal });
+                }
+                _ => neighbors
+                    .extend(all[all_start[v] as usize..all_start[v + 1] as usize].iter().map(|n| n.0)),
+            }
+        }
+        start.push(neighbors.len() as u32);
+    }
+    Domain { start, neighbors, slides }
+}
+
+fn iterate(
+    part: &Part,
+    connectivity: &Connectivity,
+    domain: &Domain,
+    parameters: &Parameters,
+    progress: &Progress,
+    result: &mut Part,
+    record: &mut SmoothingRecord,
+) -> Result<(), SmoothingError> {
+    let mesh = &part.mesh;
+    let original = &mesh.positions;
+    let free = domain.free_count();
+    if free == 0 {
+        let mut labelled = vec![false; mesh.vertex_count()];
+        for (t, design) in mesh.triangles.iter().zip(&part.design) {
+            if parameters.freeze_non_design && *design == Design::NonDesign {
+                t.iter().for_each(|v| labelled[v.index()] = true);
+            }
+        }
+        let non_design = labelled.iter().filter(|l| **l).count();
+        return Err(SmoothingError::EverythingFrozen { vertices: mesh.vertex_count(), non_design });
+    }
+    let edge = mesh.mean_edge_length();
+    let mut keeper = VolumeKeeper::new(mesh, domain);
+    if parameters.keeps_volume() {
+        if !connectivity.is_closed() {
+            return Err(SmoothingError::Open { edges: connectivity.border_edge_count() });
+        }
+        if keeper.wanted().abs() <= 1e-9 * edge * mesh.area() {
+            return Err(SmoothingError::ZeroVolume { volume: keeper.wanted() });
+        }
+    }
+    let mut step = methods::choose(parameters, domain, original);
+    let mut current = original.clone();
+    let mut next = original.clone();
+    let most = parameters.most_iterations();
+    for iteration in 1..=most {
+        progress.check()?;
+        step.step(domain, original, &current, &mut next);
+        domain.project(original, &mut next);
+        let volume = if parameters.keeps_volume() {
+            keeper.restore(domain, &mut next, edge).map_err(|volume| SmoothingError::VolumeOutOfReach {
+                iteration,
+                volume,
+                wanted: keeper.wanted(),
+                free: free - domain.slides.len(),
+            })?
+        } else {
+            keeper.volume(&next)
+        };
+        let change = change(&current, &next);
+        let rms = (change.squares / free as f64).sqrt() / edge;
+        std::mem::swap(&mut current, &mut next);
+        record.iterations = iteration;
+        record.cumulative_change += change.distances;
+        record.rms_steps.push(rms);
+        record.volumes.push(volume);
+        progress.step(iteration.into(), most.into(), "iterations");
+        if !rms.is_finite() || rms > DIVERGED {
+            return Err(SmoothingError::Diverged { iteration, step: rms });
+        }
+        if rms < parameters.tolerance {
+            record.converged = true;
+            break;
+        }
+    }
+    record.total_change = change(original, &current).distances;
+    result.mesh.positions = current;
+    Ok(())
+}

@@ -1,0 +1,159 @@
+//! Exact restoration of the volume.
+//!
+//! Let each free vertex move by `tau` along its own direction. The volume is then a cubic in `tau` whose four
+//! coefficients are sums over the faces; Newton's method solves `V(tau) = V0` to the last digits. The paper scales
+//! about the origin instead (its equations 4 and 5), which is exact only when nothing is frozen and depends on where
+//! the part lies.
+
+use crate::kernel::{CHUNK, Domain};
+use rayon::prelude::*;
+use topipe_mesh::{DVec3, TriangleMesh, VertexId};
+
+/// Knows the volume to restore and how to do it.
+pub(crate) struct VolumeKeeper {
+    triangles: Vec<[VertexId; 3]>,
+    /// Volumes are summed about this point, so that a part far from the origin keeps its digits.
+    center: DVec3,
+    wanted: f64,
+    directions: Vec<DVec3>,
+    slides: Vec<bool>,
+}
+
+/// Coefficients of `V(tau)`, by rising power.
+type Cubic = [f64; 4];
+
+fn value(c: Cubic, tau: f64) -> f64 {
+    ((c[3] * tau + c[2]) * tau + c[1]) * tau + c[0]
+}
+
+fn slope(c: Cubic, tau: f64) -> f64 {
+    (3.0 * c[3] * tau + 2.0 * c[2]) * tau + c[1]
+}
+
+impl VolumeKeeper {
+    pub(crate) fn new(mesh: &TriangleMesh, domain: &Domain) -> Self {
+        let (low, high) = mesh.bounds();
+        let mut slides = vec![false; mesh.vertex_count()];
+        for slide in &domain.slides {
+            slides[slide.vertex as usize] = true;
+        }
+        let mut keeper = Self {
+            triangles: mesh.triangles.clone(),
+            center: (low + high) / 2.0,
+            wanted: 0.0,
+            directions: vec![DVec3::ZERO; mesh.vertex_count()],
+            slides,
+        };
+        keeper.wanted = keeper.volume(&mesh.positions);
+        keeper
+    }
+
+    /// The volume of the mesh it was made for.
+    pub(crate) fn wanted(&self) -> f64 {
+        self.wanted
+    }
+
+    /// The volume inside the mesh with these positions.
+    pub(crate) fn volume(&self, positions: &[DVec3]) -> f64 {
+        let partial: Vec<f64> = self
+            .triangles
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                chunk
+                    .iter()
+                    .map(|t| {
+                        let [a, b, c] = t.map(|v| positions[v.index()] - self.center);
+                        a.dot(b.cross(c))
+                    })
+                    .sum()
+            })
+            .collect();
+        partial.iter().sum::<f64>() / 6.0
+    }
+
+    fn cubic(&self, positions: &[DVec3]) -> Cubic {
+        let partial: Vec<Cubic> = self
+            .triangles
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let mut sum = [0.0; 4];
+                for t in chunk {
+                    let [a, b, c] = t.map(|v| positions[v.index()] - self.center);
+                    let [u, v, w] = t.map(|v| self.directions[v.index()]);
+                    sum[0] += a.dot(b.cross(c));
+                    sum[1] += u.dot(b.cross(c)) + v.dot(c.cross(a)) + w.dot(a.cross(b));
+                    sum[2] += a.dot(v.cross(w)) + b.dot(w.cross(u)) + c.dot(u.cross(v));
+                    sum[3] += u.dot(v.cross(w));
+                }
+                sum
+            })
+            .collect();
+        let mut sum = [0.0; 4];
+        for p in partial {
+            for k in 0..4 {
+                sum[k] += p[k];
+            }
+        }
+        sum.map(|s| s / 6.0)
+    }
+
+    /// Moves the free vertices along their normals until the volume is the wanted one, and returns the volume it
+    /// reached, or `Err` with the present volume where an offset by up to `reach` does not do it.
+    ///
+    /// Sliding vertices have no direction: the plane they slide in stays where it is.
+    pub(crate) fn restore(
+        &mut self,
+        domain: &Domain,
+        positions: &mut [DVec3],
+        reach: f64,
+    ) -> Result<f64, f64> {
+        let slides = &self.slides;
+        let here: &[DVec3] = positions;
+        domain.sweep(
+            &mut self.directions,
+            |_| DVec3::ZERO,
+            |v, row, _| {
+                if slides[v] {
+                    return DVec3::ZERO;
+                }
+                // The row of a free vertex is its whole ring, counter-clockwise.
+                let p = here[v];
+                let mut normal = DVec3::ZERO;
+                let mut from = here[row[row.len() - 1] as usize] - p;
+                for &j in row {
+                    let to = here[j as usize] - p;
+                    normal += from.cross(to);
+                    from = to;
+                }
+                normal.normalize_or_zero()
+            },
+        );
+        // One round solves it up to the rounding of the positions; the second removes what that left.
+        let mut cubic = self.cubic(positions);
+        for _ in 0..2 {
+            let mut tau = 0.0;
+            for _ in 0..32 {
+                let step = (self.wanted - value(cubic, tau)) / slope(cubic, tau);
+                if !step.is_finite() {
+                    return Err(cubic[0]);
+                }
+                tau += step;
+                if tau.abs() > reach {
+                    return Err(cubic[0]);
+                }
+                if step.abs() <= 1e-16 * reach {
+                    break;
+                }
+            }
+            positions
+                .par_chunks_mut(CHUNK)
+                .zip(self.directions.par_chunks(CHUNK))
+                .for_each(|(p, d)| p.iter_mut().zip(d).for_each(|(p, d)| *p += tau * *d));
+            cubic = self.cubic(positions);
+            if (cubic[0] - self.wanted).abs() <= 1e-14 * self.wanted.abs() {
+                break;
+            }
+        }
+        Ok(cubic[0])
+    }
+}
