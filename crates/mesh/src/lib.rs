@@ -8,10 +8,12 @@
 //! Lengths are in millimetres once a mesh has been imported; nothing in this crate depends on that.
 
 pub mod connectivity;
+pub mod disk_map;
 pub mod ids;
 pub mod measures;
 pub mod part;
 pub mod refine;
+pub mod spatial;
 pub mod triangle_mesh;
 
 pub use connectivity::{Connectivity, ConnectivityError};
