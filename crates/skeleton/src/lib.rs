@@ -27,6 +27,7 @@ mod error;
 mod identifier_box;
 mod inside;
 mod interface;
+mod marching_sections;
 mod non_design;
 mod parameters;
 mod skeleton;
@@ -58,7 +59,7 @@ pub fn skeletonize(
             identifier_box::skeletonize(part, parameters, &connectivity, &sets, progress)
         }
         Method::MarchingSections => {
-            identifier_box::skeletonize(part, parameters, &connectivity, &sets, progress)
+            marching_sections::skeletonize(part, parameters, &connectivity, &sets, progress)
         }
     }
 }

@@ -1,0 +1,179 @@
+//! Our method: plane sections along the branches of the Reeb graph of the distance from the interfaces.
+//!
+//! 1. Each design set is cut out and its interfaces closed ([`piece`]), so that it is a closed surface.
+//! 2. The geodesic distance from all interfaces, or from a far tip where there are none ([`geodesic`]), gives a Reeb
+//!    graph with one cycle per handle ([`reeb`]): the graph of the skeleton is right before any point is.
+//! 3. Bumps are removed and chains joined ([`branches`]); no step from here on changes the number of cycles.
+//! 4. Along each branch plane sections are cut across the smoothed tangent and their points moved to the area
+//!    centroids; sections that belong to junctions are left out ([`axis`]).
+//! 5. Branches too short to have an axis are contracted; each junction goes to the least-squares intersection of the
+//!    axes of its branches ([`junction`]).
+//! 6. The points that remain are centred once more, with exactly the tangents of the final skeleton.
+
+mod axis;
+mod branches;
+mod emit;
+mod geodesic;
+mod junction;
+mod piece;
+mod reeb;
+mod section;
+
+use crate::inside::Inside;
+use crate::interface::Sets;
+use crate::skeleton::{PointKind, Section, Skeleton};
+use crate::{Method, Parameters, SkeletonError, non_design};
+use axis::Axis;
+use branches::{Branch, BranchGraph, NodeKind};
+use glam::DVec3;
+use piece::Piece;
+use rayon::prelude::*;
+use reeb::ReebGraph;
+use section::Cutter;
+use topipe_mesh::{Connectivity, Design, Part, VertexId};
+use topipe_progress::Progress;
+
+/// A branch between two junctions with a shorter clean axis than this many radii is a part of one junction.
+const SHORTEST: f64 = 1.0;
+
+pub(crate) fn skeletonize(
+    part: &Part,
+    parameters: &Parameters,
+    connectivity: &Connectivity,
+    sets: &Sets,
+    progress: &Progress,
+) -> Result<Skeleton, SkeletonError> {
+    let inside = Inside::new(&part.mesh);
+    let mut skeleton = Skeleton::new(Method::MarchingSections);
+    let interface_points: Vec<_> = (sets.interfaces.iter())
+        .map(|i| {
+            let choices = [Some(i.centroid), Some(i.node_mean), inside.nearest_middle(i.centroid)];
+            let point = choices.into_iter().flatten().find(|&p| inside.contains(p)).unwrap_or(i.centroid);
+            skeleton.add_point(point, PointKind::Interface, Section::None)
+        })
+        .collect();
+    let designs: Vec<_> = sets.with_label(Design::Design).collect();
+    for (k, &set) in designs.iter().enumerate() {
+        progress.step(k as u64, designs.len() as u64, "design sets");
+        progress.check()?;
+        let piece = Piece::cut(&part.mesh, connectivity, sets, set)?;
+        if piece.mesh.volume() < 0.0 {
+            let p = piece.mesh.positions[0];
+            skeleton
+                .remarks
+                .push(format!("the cavity at ({:.3}, {:.3}, {:.3}) has no skeleton", p.x, p.y, p.z));
+            continue;
+        }
+        let (graph, axes) = trace(&piece, parameters, sets, progress, &mut skeleton.remarks)?;
+        emit::emit(&mut skeleton, &piece, &graph, &axes, parameters, &inside, &interface_points);
+    }
+    non_design::join(&mut skeleton, part, connectivity, sets, &inside, &interface_points);
+    skeleton.finish();
+    let degrees = skeleton.degrees();
+    let bare = interface_points.iter().filter(|&&p| degrees[p as usize] < 2).count();
+    if bare > 0 {
+        skeleton.remarks.push(format!("{bare} interfaces have no branch"));
+    }
+    Ok(skeleton)
+}
+
+/// Steps 2 to 5 for one piece: its branches, and the axis of each.
+fn trace(
+    piece: &Piece,
+    parameters: &Parameters,
+    sets: &Sets,
+    progress: &Progress,
+    remarks: &mut Vec<String>,
+) -> Result<(BranchGraph, Vec<Axis>), SkeletonError> {
+    let sources = if piece.rims.is_empty() { vec![far_tip(piece)] } else { piece.rims.clone() };
+    let value = geodesic::distance(piece, &sources);
+    progress.check()?;
+    let reeb = ReebGraph::build(&piece.connectivity, &value);
+    let genus = piece.connectivity.genus(&piece.mesh).unwrap_or(0);
+    if reeb.cycles() != genus {
+        remarks.push(format!(
+            "{} of {genus} loops of a design set are lost in a vertex where many level lines meet",
+            genus - reeb.cycles()
+        ));
+    }
+    let mut graph = BranchGraph::new(piece, &reeb, &value);
+    graph.remove_bumps(parameters.bump_radii);
+    let mut axes: Vec<Option<Axis>> = vec![None; graph.branches.len()];
+    // Each round but the last removes a branch.
+    loop {
+        progress.check()?;
+        let todo: Vec<_> =
+            (0..axes.len()).filter(|&b| graph.branches[b].is_some() && axes[b].is_none()).collect();
+        let found: Vec<_> = todo
+            .par_iter()
+            .map_init(
+                || Cutter::new(piece),
+                |cutter, &b| {
+                    let branch = graph.branches[b].as_ref()?;
+                    let ends = branch.ends.map(|n| match graph.nodes[n] {
+                        NodeKind::Interface(i) => Some(sets.interfaces[i].centroid),
+                        _ => None,
+                    });
+                    Some(Axis::find(branch, ends, cutter, parameters.junction_ratio))
+                },
+            )
+            .collect();
+        for (b, axis) in todo.into_iter().zip(found) {
+            axes[b] = axis;
+        }
+        let Some(b) = superfluous(&graph, &axes) else { break };
+        let before: Vec<_> = graph.branches.iter().map(signature).collect();
+        let is_tip = |n: usize| matches!(graph.nodes[n], NodeKind::Tip(_));
+        if graph.branches[b].as_ref().is_some_and(|x| x.ends.iter().any(|&n| is_tip(n))) {
+            graph.remove(b);
+        } else {
+            graph.contract(b);
+        }
+        for k in 0..axes.len() {
+            if signature(&graph.branches[k]) != before[k] {
+                axes[k] = None;
+            }
+        }
+    }
+    Ok((graph, axes.into_iter().map(Option::unwrap_or_default).collect()))
+}
+
+/// Changes when a branch is removed or joined with another; not when its ends are renamed.
+fn signature(branch: &Option<Branch>) -> usize {
+    branch.as_ref().map_or(usize::MAX, |b| b.vertices.len())
+}
+
+/// The shortest branch that is part of a junction, or a free end without an axis.
+fn superfluous(graph: &BranchGraph, axes: &[Option<Axis>]) -> Option<usize> {
+    let mut shortest: Option<(f64, usize)> = None;
+    for (b, branch) in graph.branches.iter().enumerate() {
+        let (Some(branch), Some(axis)) = (branch, &axes[b]) else { continue };
+        let [first, last] = branch.ends.map(|n| graph.nodes[n]);
+        let saddles = [first, last].iter().filter(|k| **k == NodeKind::Saddle).count();
+        let tips = [first, last].iter().filter(|k| matches!(k, NodeKind::Tip(_))).count();
+        let removable = branch.ends[0] != branch.ends[1] && (saddles == 2 || (saddles == 1 && tips == 1));
+        let radius = axis.radius();
+        let length = if radius > 0.0 { axis.length() / radius } else { 0.0 };
+        if removable && length < SHORTEST && shortest.is_none_or(|(l, _)| length < l) {
+            shortest = Some((length, b));
+        }
+    }
+    shortest.map(|s| s.1)
+}
+
+/// A vertex at an end of the piece: the farthest from the farthest from the first.
+fn far_tip(piece: &Piece) -> VertexId {
+    let mut v = VertexId::new(0);
+    for _ in 0..2 {
+        let distance = geodesic::distance(piece, &[v]);
+        v = (0..distance.len())
+            .max_by(|&a, &b| distance[a].total_cmp(&distance[b]).then(b.cmp(&a)))
+            .map_or(v, VertexId::new);
+    }
+    v
+}
+
+/// The mean of some points; `None` for none.
+fn mean(points: &[DVec3]) -> Option<DVec3> {
+    (!points.is_empty()).then(|| points.iter().sum::<DVec3>() / points.len() as f64)
+}

@@ -1,0 +1,219 @@
+//! From the Reeb graph to a graph of branches: level loops become points, bumps go, chains become one branch.
+
+use super::piece::Piece;
+use super::reeb::ReebGraph;
+use glam::DVec3;
+use topipe_mesh::VertexId;
+
+/// What a branch ends at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum NodeKind {
+    /// An interface, by its number.
+    Interface(usize),
+    /// The tip of a free end or of a bump, at this point of the surface.
+    Tip(DVec3),
+    /// Where level loops split or merge.
+    Saddle,
+}
+
+/// The middle of a level loop.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sample {
+    pub(super) point: DVec3,
+    /// Radius of the circle of equal area.
+    pub(super) radius: f64,
+}
+
+/// One future branch.
+#[derive(Debug, Clone)]
+pub(super) struct Branch {
+    pub(super) ends: [usize; 2],
+    pub(super) samples: Vec<Sample>,
+    /// The vertices of the surface around it, to find its sections by.
+    pub(super) vertices: Vec<VertexId>,
+}
+
+/// Branches and what they end at. Removed branches are `None`.
+#[derive(Debug, Clone)]
+pub(super) struct BranchGraph {
+    pub(super) nodes: Vec<NodeKind>,
+    pub(super) branches: Vec<Option<Branch>>,
+}
+
+impl BranchGraph {
+    pub(super) fn new(piece: &Piece, reeb: &ReebGraph, value: &[f64]) -> Self {
+        let mut degree = vec![0; reeb.nodes.len()];
+        reeb.arcs.iter().flat_map(|a| a.ends).for_each(|n| degree[n as usize] += 1);
+        let nodes = (reeb.nodes.iter().zip(&degree))
+            .map(|(&v, &degree)| match piece.tips.iter().find(|(_, tip)| *tip == v) {
+                Some(&(interface, _)) => NodeKind::Interface(interface),
+                None if degree == 1 => NodeKind::Tip(piece.mesh.position(v)),
+                None => NodeKind::Saddle,
+            })
+            .collect();
+        let edge = piece.mesh.mean_edge_length();
+        let branches = (reeb.arcs.iter())
+            .map(|arc| {
+                let mut samples: Vec<Sample> = Vec::new();
+                let mut next = f64::NEG_INFINITY;
+                for &v in &arc.vertices {
+                    if value[v.index()] >= next {
+                        let sample = level_loop(piece, reeb, value, v);
+                        next = value[v.index()] + 0.5 * sample.radius.max(edge);
+                        samples.push(sample);
+                    }
+                }
+                Some(Branch { ends: arc.ends.map(|n| n as usize), samples, vertices: arc.vertices.clone() })
+            })
+            .collect();
+        Self { nodes, branches }
+    }
+
+    /// The branches at a node, each with the end it has there; a branch that returns to the node comes twice.
+    pub(super) fn at(&self, node: usize) -> Vec<(usize, usize)> {
+        let mut list = Vec::new();
+        for (b, branch) in self.branches.iter().enumerate() {
+            if let Some(branch) = branch {
+                list.extend([0, 1].into_iter().filter(|&k| branch.ends[k] == node).map(|k| (b, k)));
+            }
+        }
+        list
+    }
+
+    /// Removes free ends that are bumps on a beam, the lowest first, until none is left.
+    pub(super) fn remove_bumps(&mut self, ratio: f64) {
+        self.join_all();
+        while let Some(b) = self.lowest_bump(ratio) {
+            self.remove(b);
+        }
+    }
+
+    /// Removes a branch and joins what then is one branch at its ends.
+    pub(super) fn remove(&mut self, b: usize) {
+        if let Some(branch) = self.branches[b].take() {
+            branch.ends.iter().for_each(|&n| {
+                self.join(n);
+            });
+        }
+    }
+
+    /// Makes the two ends of a branch one node.
+    pub(super) fn contract(&mut self, b: usize) {
+        let Some(gone) = self.branches[b].take() else { return };
+        let [keep, drop] = gone.ends;
+        for branch in self.branches.iter_mut().flatten() {
+            for end in &mut branch.ends {
+                if *end == drop {
+                    *end = keep;
+                }
+            }
+        }
+        self.join(keep);
+    }
+
+    fn lowest_bump(&self, ratio: f64) -> Option<usize> {
+        let mut incident = vec![Vec::new(); self.nodes.len()];
+        for (b, branch) in self.branches.iter().enumerate() {
+            if let Some(branch) = branch {
+                (0..2).for_each(|k| incident[branch.ends[k]].push((b, k)));
+            }
+        }
+        let mut lowest: Option<(f64, usize)> = None;
+        for (b, branch) in self.branches.iter().enumerate() {
+            let Some(branch) = branch else { continue };
+            for k in 0..2 {
+                let NodeKind::Tip(tip) = self.nodes[branch.ends[k]] else { continue };
+                let foot = branch.ends[1 - k];
+                if self.nodes[foot] != NodeKind::Saddle {
+                    continue;
+                }
+                let near: Vec<Sample> = incident[foot]
+                    .iter()
+                    .filter(|(other, _)| *other != b)
+                    .filter_map(|&(other, end)| {
+                        let samples = &self.branches[other].as_ref()?.samples;
+                        if end == 0 { samples.first() } else { samples.last() }.copied()
+                    })
+                    .collect();
+                let height = if near.is_empty() {
+                    0.0
+                } else {
+                    let axis = near.iter().map(|s| s.point).sum::<DVec3>() / near.len() as f64;
+                    let radius = near.iter().map(|s| s.radius).fold(f64::MIN_POSITIVE, f64::max);
+                    tip.distance(axis) / radius
+                };
+                if height < ratio && lowest.is_none_or(|(h, _)| height < h) {
+                    lowest = Some((height, b));
+                }
+            }
+        }
+        lowest.map(|l| l.1)
+    }
+
+    fn join_all(&mut self) {
+        for node in 0..self.nodes.len() {
+            self.join(node);
+        }
+    }
+
+    /// Where exactly two ends of two branches meet in a saddle, they become one branch.
+    fn join(&mut self, node: usize) {
+        if self.nodes[node] != NodeKind::Saddle {
+            return;
+        }
+        let [(a, end_a), (b, end_b)] = self.at(node)[..] else { return };
+        if a == b {
+            return; // a ring
+        }
+        let (Some(mut first), Some(mut second)) = (self.branches[a].take(), self.branches[b].take()) else {
+            return;
+        };
+        if end_a == 0 {
+            first.reverse();
+        }
+        if end_b == 1 {
+            second.reverse();
+        }
+        first.ends[1] = second.ends[1];
+        first.samples.extend(second.samples);
+        first.vertices.extend(second.vertices);
+        self.branches[a] = Some(first);
+    }
+}
+
+impl Branch {
+    fn reverse(&mut self) {
+        self.ends.reverse();
+        self.samples.reverse();
+    }
+}
+
+/// The length-weighted middle of the level loop just above `v`.
+fn level_loop(piece: &Piece, reeb: &ReebGraph, value: &[f64], v: VertexId) -> Sample {
+    let connectivity = &piece.connectivity;
+    let here = reeb.rank[v.index()];
+    let position = piece.mesh.position(v);
+    let Some(start) = connectivity.outgoing(v).find(|&h| reeb.rank[connectivity.target(h).index()] > here)
+    else {
+        return Sample { point: position, radius: 0.0 };
+    };
+    let level = value[v.index()];
+    let mut points = Vec::new();
+    reeb.walk_level(connectivity, start, here, |h| {
+        let (a, b) = (connectivity.origin(h), connectivity.target(h));
+        let (fa, fb) = (value[a.index()], value[b.index()]);
+        let t = if fa == fb { 0.5 } else { ((level - fa) / (fb - fa)).clamp(0.0, 1.0) };
+        points.push(piece.mesh.position(a).lerp(piece.mesh.position(b), t));
+    });
+    let n = points.len();
+    let (mut sum, mut length, mut area) = (DVec3::ZERO, 0.0, DVec3::ZERO);
+    for k in 0..n {
+        let (a, b) = (points[k], points[(k + 1) % n]);
+        let l = a.distance(b);
+        length += l;
+        sum += l * (a + b) / 2.0;
+        area += (a - position).cross(b - position) / 2.0;
+    }
+    let point = if length > 0.0 { sum / length } else { position };
+    Sample { point, radius: (area.length() / std::f64::consts::PI).sqrt() }
+}

@@ -1,0 +1,215 @@
+//! From axes to the points and edges of the skeleton.
+
+use super::axis::{Axis, resample};
+use super::branches::{Branch, BranchGraph, NodeKind};
+use super::piece::Piece;
+use super::section::{Cutter, Loop};
+use super::{junction, mean};
+use crate::Parameters;
+use crate::inside::Inside;
+use crate::skeleton::{PointKind, Section, Skeleton};
+use glam::DVec3;
+
+/// Rounds of the last centring. The third moves points of the fixtures by less than 1e-3 radii.
+const ROUNDS: usize = 4;
+
+/// Where a node stands: its position, and its point in the skeleton (none for the seam of a ring).
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    at: DVec3,
+    point: Option<u32>,
+}
+
+pub(super) fn emit(
+    skeleton: &mut Skeleton,
+    piece: &Piece,
+    graph: &BranchGraph,
+    axes: &[Axis],
+    parameters: &Parameters,
+    inside: &Inside,
+    interface_points: &[u32],
+) {
+    let mut places: Vec<Option<Place>> = vec![None; graph.nodes.len()];
+    for node in 0..graph.nodes.len() {
+        let incident = graph.at(node);
+        if incident.is_empty() {
+            continue;
+        }
+        let ring = incident.len() == 2 && incident[0].0 == incident[1].0;
+        places[node] = Some(match graph.nodes[node] {
+            NodeKind::Interface(i) => {
+                let point = interface_points[i];
+                Place { at: skeleton.points[point as usize], point: Some(point) }
+            }
+            NodeKind::Saddle => {
+                let at = meeting_point(graph, axes, &incident, inside);
+                let point = (!ring).then(|| skeleton.add_point(at, PointKind::Junction, Section::None));
+                Place { at, point }
+            }
+            NodeKind::Tip(tip) => {
+                let (b, end) = incident[0];
+                let at = free_end(&axes[b], end == 0, tip, inside);
+                Place { at, point: Some(skeleton.add_point(at, PointKind::End, Section::None)) }
+            }
+        });
+    }
+    let mut cutter = Cutter::new(piece);
+    for (b, branch) in graph.branches.iter().enumerate() {
+        let Some(branch) = branch else { continue };
+        let [Some(first), Some(last)] = branch.ends.map(|n| places[n]) else { continue };
+        // Enough points that a ring, a loop at a junction or one of several branches between the same junctions
+        // stays what it is in a graph with at most one edge between two points.
+        let twins = graph.branches.iter().flatten().filter(|x| {
+            x.ends == branch.ends || (x.ends[0] == branch.ends[1] && x.ends[1] == branch.ends[0])
+        });
+        let least = match (branch.ends[0] == branch.ends[1], first.point) {
+            (true, None) => 3,
+            (true, Some(_)) => 2,
+            (false, _) => usize::from(twins.count() > 1),
+        };
+        let points = centred(branch, &axes[b], [first, last], least, &mut cutter, parameters, inside);
+        let ids: Vec<_> = points
+            .into_iter()
+            .map(|(p, section)| skeleton.add_point(p, PointKind::Branch, section))
+            .collect();
+        let chain: Vec<u32> = first.point.into_iter().chain(ids.iter().copied()).chain(last.point).collect();
+        chain.windows(2).for_each(|w| skeleton.add_edge(w[0], w[1]));
+        if first.point.is_none()
+            && let (Some(&a), Some(&z)) = (ids.first(), ids.last()) {
+                skeleton.add_edge(a, z);
+            }
+    }
+}
+
+/// The least-squares intersection of the axes of the branches, if it lies in the material near them.
+fn meeting_point(graph: &BranchGraph, axes: &[Axis], incident: &[(usize, usize)], inside: &Inside) -> DVec3 {
+    let lines: Vec<_> = incident.iter().filter_map(|&(b, end)| axes[b].ray(end == 0)).collect();
+    let ends: Vec<_> = lines.iter().map(|l| l.0).collect();
+    let samples: Vec<_> = incident
+        .iter()
+        .filter_map(|&(b, end)| {
+            let samples = &graph.branches[b].as_ref()?.samples;
+            if end == 0 { samples.first() } else { samples.last() }.map(|s| s.point)
+        })
+        .collect();
+    let middle = mean(&ends).or(mean(&samples)).unwrap_or(DVec3::ZERO);
+    let around = ends.iter().map(|e| e.distance(middle)).fold(0.0, f64::max);
+    let met = junction::intersection(&lines, middle);
+    let mut choices = vec![middle];
+    if met.distance(middle) <= 1.5 * around {
+        choices.insert(0, met);
+        choices.push(met.lerp(middle, 0.5));
+    }
+    choices.extend(mean(&samples));
+    choices.extend(inside.nearest_middle(middle));
+    choices.extend(ends);
+    choices.extend(samples);
+    choices.iter().copied().find(|&p| inside.contains(p)).unwrap_or(middle)
+}
+
+/// A free end: straight on from the last clean section, to just below the surface.
+fn free_end(axis: &Axis, at_start: bool, tip: DVec3, inside: &Inside) -> DVec3 {
+    let Some((end, direction)) = axis.ray(at_start) else {
+        return inside.nearest_middle(tip).unwrap_or(tip);
+    };
+    let step = 0.05 * axis.radius();
+    let most = (end.distance(tip) / step).clamp(1.0, 1000.0) as usize;
+    let reached = (1..=most).take_while(|&k| inside.contains(end + k as f64 * step * direction)).count();
+    end + (reached as f64 - 0.5).max(0.0) * step * direction
+}
+
+/// The points of a branch between its ends: sparse, and centred with the tangents they have in the skeleton.
+fn centred(
+    branch: &Branch,
+    axis: &Axis,
+    ends: [Place; 2],
+    least: usize,
+    cutter: &mut Cutter<'_>,
+    parameters: &Parameters,
+    inside: &Inside,
+) -> Vec<(DVec3, Section)> {
+    let radius = axis.radius();
+    if axis.sections.len() < 2 || radius <= 0.0 {
+        return without_axis(branch, least, inside);
+    }
+    let ring = ends[0].point.is_none();
+    let count = ((axis.length() / (parameters.spacing * radius)).round() as usize + 1).max(least).max(1);
+    let total = axis.sections.len();
+    let pick = |k: usize| if count == 1 { total / 2 } else { k * (total - 1) / (count - 1) };
+    let mut picked: Vec<usize> = (0..count).map(pick).collect();
+    picked.dedup();
+    if picked.len() < least {
+        return without_axis(branch, least, inside);
+    }
+    let mut points: Vec<Loop> = picked.into_iter().map(|k| axis.sections[k].clone()).collect();
+    let near = 2.5 * radius;
+    for round in 0..ROUNDS {
+        let n = points.len();
+        let at = |points: &[Loop], k: isize| match (k, ring) {
+            (-1, true) => points[n - 1].centroid,
+            (-1, false) => ends[0].at,
+            (k, true) if k as usize == n => points[0].centroid,
+            (k, false) if k as usize == n => ends[1].at,
+            (k, _) => points[k as usize].centroid,
+        };
+        let mut good = vec![false; n];
+        let mut next = points.clone();
+        for k in 0..n {
+            let tangent = (at(&points, k as isize + 1) - at(&points, k as isize - 1)).normalize_or_zero();
+            if tangent == DVec3::ZERO {
+                continue;
+            }
+            let found = cutter.cut(points[k].centroid, tangent, &branch.vertices, near);
+            if let Some(found) = found.filter(|l| {
+                l.holds_centroid && !l.cut_off && l.area <= parameters.junction_ratio * points[k].area
+            }) {
+                good[k] = inside.contains(found.centroid);
+                next[k] = found;
+            }
+        }
+        points = next;
+        // Next to a junction the tangent may turn so far that the section runs into it.
+        let mut keep = good.clone();
+        let spare = n.saturating_sub(least.max(1));
+        let mut dropped = 0;
+        for k in 0..n {
+            if !keep[k] && dropped < spare {
+                dropped += 1;
+            } else {
+                keep[k] = true;
+            }
+        }
+        let mut kept = keep.iter();
+        points.retain(|_| *kept.next().unwrap_or(&true));
+        if round + 1 == ROUNDS {
+            break;
+        }
+    }
+    points
+        .into_iter()
+        .map(|l| {
+            let section = Section::Plane { area: l.area, normal: l.normal, moments: l.moments, axis: l.axis };
+            (within(l.centroid, inside), section)
+        })
+        .collect()
+}
+
+/// Points for a branch that has no clean section: the level loops are all there is.
+fn without_axis(branch: &Branch, least: usize, inside: &Inside) -> Vec<(DVec3, Section)> {
+    let line: Vec<_> = branch.samples.iter().map(|s| s.point).collect();
+    let Some(&first) = line.first() else {
+        return Vec::new();
+    };
+    let length: f64 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
+    let mut points = if line.len() < 2 { vec![first; least] } else { resample(&line, length / 6.0) };
+    if points.len() > least.max(1) {
+        let n = points.len();
+        points = (0..least).map(|k| points[(k + 1) * n / (least + 1)]).collect();
+    }
+    points.truncate(least);
+    points.into_iter().map(|p| (within(p, inside), Section::None)).collect()
+}
+
+fn within(p: DVec3, inside: &Inside) -> DVec3 {
+    if inside.contains(p) { p } else { inside.nearest_middle(p).unwrap_or(p) }
+}
