@@ -1,0 +1,39 @@
+//! What a user may set.
+
+use crate::QuadMatchingError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the layout. Angles are in degrees, all else is dimensionless.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Parameters {
+    /// Corners wider than this, in degrees, begin to cost in the matching: exp((angle - soft) / 5).
+    pub soft_corner_angle: f64,
+    /// The layout is refused when a corner is wider than this, in degrees (a patch folds at 180); 360 = never.
+    pub max_corner_angle: f64,
+    /// Points nearer to a vertex than this fraction of an edge are moved onto it when macro-edges are cut.
+    pub snap: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self { soft_corner_angle: 120.0, max_corner_angle: 360.0, snap: 0.1 }
+    }
+}
+
+impl Parameters {
+    /// Checks the ranges.
+    pub fn validate(&self) -> Result<(), QuadMatchingError> {
+        let check = |field, value: f64, low, high, range| {
+            if (low..=high).contains(&value) {
+                Ok(())
+            } else {
+                Err(QuadMatchingError::Parameter { field, value: value.to_string(), range })
+            }
+        };
+        check("soft_corner_angle", self.soft_corner_angle, 60.0, 180.0, "60 to 180 degrees")?;
+        check("max_corner_angle", self.max_corner_angle, 90.0, 360.0, "90 to 360 degrees")?;
+        check("snap", self.snap, 0.0, 0.45, "0 to 0.45")
+    }
+}

@@ -1,0 +1,329 @@
+//! Spokes: paths of mesh edges from the site of a tile to the middles of its sides.
+//!
+//! Source, section 2.2, after Eck et al. 1995: the tile is mapped to a disk, and straight segments from the centre to
+//! the middles of the sides are cut into the mesh. Here the border of the tile goes to a circle, not to a polygon:
+//! on a strictly convex border the map is one-to-one without exceptions. Where feature curves run from the site to
+//! the border they become spokes as they are: they are straightened in the map, so that each sector between two of
+//! them is mapped for itself.
+
+use crate::QuadMatchingError;
+use crate::sides::Tiled;
+use std::collections::{BTreeSet, HashMap, HashSet, VecDeque};
+use std::f64::consts::{PI, TAU};
+use topipe_mesh::disk_map::DiskMap;
+use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
+
+/// A tile with its border and the spokes that are already fixed.
+pub(crate) struct SpokeTask {
+    pub(crate) tile: u32,
+    /// All border vertices, counter-clockwise.
+    pub(crate) border: Vec<VertexId>,
+    /// Middles of the sides, counter-clockwise, with the fixed path from the site where a feature gives one.
+    pub(crate) targets: Vec<(VertexId, Option<Vec<VertexId>>)>,
+    /// The faces of the tile.
+    pub(crate) faces: Vec<FaceId>,
+    /// The site, where a feature fixes it.
+    pub(crate) anchor: Option<VertexId>,
+}
+
+/// Plane coordinates of the tile's vertices; computed for many tiles at once, before any of them is cut.
+pub(crate) fn map(tiled: &Tiled, task: &SpokeTask) -> Option<DiskMap> {
+    let mesh = &tiled.refiner.part().mesh;
+    let n = task.border.len();
+    let mut along = vec![0.0];
+    for k in 0..n {
+        let step = mesh.position(task.border[k]).distance(mesh.position(task.border[(k + 1) % n]));
+        along.push(along[k] + step.max(f64::MIN_POSITIVE));
+    }
+    let total = along[n];
+    let fixed_at: Vec<usize> = task
+        .targets
+        .iter()
+        .filter(|t| t.1.is_some())
+        .filter_map(|t| task.border.iter().position(|&v| v == t.0))
+        .collect();
+    let mut angle = vec![0.0; n];
+    if fixed_at.len() < 2 {
+        for k in 0..n {
+            angle[k] = TAU * along[k] / total;
+        }
+    } else {
+        // Sectors between fixed spokes, by length but none above half a turn, so that each is convex.
+        let count = fixed_at.len();
+        let share: Vec<f64> = (0..count)
+            .map(|i| {
+                let (a, b) = (fixed_at[i], fixed_at[(i + 1) % count]);
+                let part = along[b] - along[a];
+                if part > 0.0 { part } else { part + total }
+            })
+            .collect();
+        let sectors = sector_angles(&share);
+        let mut start = 0.0;
+        for i in 0..count {
+            let (a, b) = (fixed_at[i], fixed_at[(i + 1) % count]);
+            let mut k = a;
+            while k != b {
+                let part = along[k] - along[a];
+                let part = if part >= 0.0 { part } else { part + total };
+                angle[k] = start + sectors[i] * part / share[i];
+                k = (k + 1) % n;
+            }
+            start += sectors[i];
+        }
+    }
+    let mut fixed: HashMap<VertexId, glam::DVec2> = HashMap::with_capacity(n);
+    for k in 0..n {
+        fixed.insert(task.border[k], glam::DVec2::from_angle(angle[k]));
+    }
+    for (target, path) in &task.targets {
+        let Some(path) = path else { continue };
+        let end = fixed[target];
+        let mut reach = vec![0.0];
+        for pair in path.windows(2) {
+            reach.push(reach[reach.len() - 1] + mesh.position(pair[0]).distance(mesh.position(pair[1])));
+        }
+        for (k, &v) in path.iter().enumerate().take(path.len() - 1) {
+            fixed.insert(v, end * (reach[k] / reach[reach.len() - 1]));
+        }
+    }
+    DiskMap::solve(mesh, &task.faces, &fixed)
+}
+
+/// Angles proportional to `share`, none above half a turn, all together a full turn.
+fn sector_angles(share: &[f64]) -> Vec<f64> {
+    let most = if share.len() == 2 { PI } else { 0.9 * PI };
+    let total: f64 = share.iter().sum();
+    let mut angles: Vec<f64> = share.iter().map(|s| TAU * s / total).collect();
+    if let Some(wide) = (0..share.len()).find(|&i| angles[i] > most) {
+        let rest = total - share[wide];
+        for i in 0..share.len() {
+            angles[i] = if i == wide { most } else { (TAU - most) * share[i] / rest };
+        }
+    }
+    // After widening the others one of them may be too wide in turn; with three or more that ends after a step.
+    if let Some(wide) = (0..share.len()).find(|&i| angles[i] > most * (1.0 + 1e-12)) {
+        let excess = angles[wide] - most;
+        let others: Vec<usize> = (0..share.len()).filter(|&i| angles[i] < most).collect();
+        angles[wide] = most;
+        for &i in &others {
+            angles[i] += excess / others.len() as f64;
+        }
+    }
+    angles
+}
+
+/// Cuts the spokes of a tile into the mesh. Returns the site, and per target the path from the site to it.
+pub(crate) fn cut(
+    tiled: &mut Tiled,
+    task: &SpokeTask,
+    map: Option<DiskMap>,
+    snap: f64,
+) -> Result<(VertexId, Vec<Vec<VertexId>>), QuadMatchingError> {
+    let mut cutter = Cutter {
+        map: map.unwrap_or(DiskMap { places: HashMap::new() }),
+        border: task.border.iter().copied().collect(),
+        on_spoke: HashSet::new(),
+        spoke_edges: BTreeSet::new(),
+        tile: task.tile,
+        snap,
+    };
+    let site = match task.anchor {
+        Some(vertex) => vertex,
+        None => cutter.center(tiled, &task.faces),
+    };
+    for path in task.targets.iter().filter_map(|t| t.1.as_ref()) {
+        cutter.block(path);
+    }
+    let mut paths = Vec::with_capacity(task.targets.len());
+    for (target, fixed) in &task.targets {
+        let path = match fixed {
+            Some(path) => path.clone(),
+            None => {
+                let path = match cutter.straight(tiled, site, *target) {
+                    Some(path) => path,
+                    None => cutter
+                        .detour(tiled, site, *target)
+                        .ok_or(QuadMatchingError::Blocked { tile: task.tile })?,
+                };
+                cutter.block(&path);
+                path
+            }
+        };
+        paths.push(path);
+    }
+    Ok((site, paths))
+}
+
+struct Cutter {
+    map: DiskMap,
+    border: HashSet<VertexId>,
+    on_spoke: HashSet<VertexId>,
+    spoke_edges: BTreeSet<[VertexId; 2]>,
+    tile: u32,
+    snap: f64,
+}
+
+fn key(a: VertexId, b: VertexId) -> [VertexId; 2] {
+    if a < b { [a, b] } else { [b, a] }
+}
+
+impl Cutter {
+    fn block(&mut self, path: &[VertexId]) {
+        self.on_spoke.extend(path);
+        self.spoke_edges.extend(path.windows(2).map(|w| key(w[0], w[1])));
+    }
+
+    fn orient(&self, a: VertexId, b: VertexId, c: VertexId) -> f64 {
+        let [a, b, c] = [a, b, c].map(|v| {
+            let p = self.map.at(v);
+            robust::Coord { x: p.x, y: p.y }
+        });
+        robust::orient2d(a, b, c)
+    }
+
+    /// The vertex nearest to the centre of the disk, or a new one there when none is near.
+    fn center(&mut self, tiled: &mut Tiled, faces: &[FaceId]) -> VertexId {
+        let mesh = &tiled.refiner.part().mesh;
+        let nearest =
+            faces.iter().flat_map(|f| mesh.triangles[f.index()]).filter(|v| !self.border.contains(v)).min_by(
+                |&a, &b| {
+                    let d = |v| self.map.at(v).length_squared();
+                    d(a).total_cmp(&d(b)).then(a.cmp(&b))
+                },
+            );
+        // A quarter of the radius off is hardly visible in the layout, and spares slivers.
+        if let Some(vertex) = nearest {
+            if self.map.at(vertex).length() < 0.25 {
+                return vertex;
+            }
+        }
+        // The face around the centre; the one that contains it best if rounding leaves none.
+        let score = |f: FaceId| -> (f64, [f64; 3]) {
+            let [a, b, c] = mesh.triangles[f.index()].map(|v| self.map.at(v));
+            let area = (b - a).perp_dot(c - a);
+            let w = [b.perp_dot(c) / area, c.perp_dot(a) / area, a.perp_dot(b) / area];
+            let least = w.into_iter().fold(f64::INFINITY, f64::min);
+            (if area > 0.0 && least.is_finite() { least } else { f64::NEG_INFINITY }, w)
+        };
+        let mut best = (f64::NEG_INFINITY, [1.0 / 3.0; 3], faces[0]);
+        for &f in faces {
+            let (least, w) = score(f);
+            if least > best.0 {
+                best = (least, w, f);
+            }
+        }
+        // Keep away from the edges of the face, or slivers follow.
+        let mut weights = best.1.map(|w| w.clamp(0.1, 0.8));
+        let sum: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|w| *w /= sum);
+        let corners = mesh.triangles[best.2.index()];
+        let place = (0..3).map(|k| weights[k] * self.map.at(corners[k])).sum();
+        let vertex = tiled.split_face(best.2, weights);
+        self.map.places.insert(vertex, place);
+        vertex
+    }
+
+    /// Follows the straight segment in the plane, cutting the edges it crosses. `None` when it would cross another
+    /// spoke or the border, which needs a degenerate map; what was cut until then stays and does no harm.
+    fn straight(&mut self, tiled: &mut Tiled, site: VertexId, target: VertexId) -> Option<Vec<VertexId>> {
+        let mut path = vec![site];
+        let mut current = site;
+        // Each step crosses one edge; a straight line crosses none twice.
+        let most = 10 * tiled.tile_of_face.len();
+        for _ in 0..most {
+            let fan = tiled.refiner.outgoing(current);
+            if fan.iter().any(|&h| tiled.refiner.target(h) == target) {
+                path.push(target);
+                return Some(path);
+            }
+            let mut next = None;
+            for h in fan {
+                if tiled.tile(h) != self.tile {
+                    continue;
+                }
+                let (a, b) = (tiled.refiner.target(h), tiled.refiner.origin(h.prev()));
+                let (to_a, to_b) = (self.orient(current, a, target), self.orient(current, b, target));
+                // Inside the wedge, and not behind it.
+                if to_a >= 0.0 && to_b <= 0.0 && self.orient(current, a, b) > 0.0 {
+                    next = Some((h.next(), a, b, to_a, -to_b));
+                    break;
+                }
+            }
+            let (across, a, b, to_a, to_b) = next?;
+            // Where the segment crosses a-b: distances of a and b from the line are in the ratio of the areas.
+            let t = if to_a + to_b > 0.0 { to_a / (to_a + to_b) } else { 0.5 };
+            let free = |v: VertexId| !self.border.contains(&v) && !self.on_spoke.contains(&v);
+            let vertex = if t <= self.snap && free(a) {
+                a
+            } else if t >= 1.0 - self.snap && free(b) {
+                b
+            } else if self.spoke_edges.contains(&key(a, b)) || tiled.is_border(across) {
+                return None;
+            } else {
+                let t = t.clamp(0.02, 0.98);
+                let place = self.map.at(a).lerp(self.map.at(b), t);
+                let vertex = tiled.split_edge(across, t);
+                self.map.places.insert(vertex, place);
+                vertex
+            };
+            if path.contains(&vertex) {
+                return None;
+            }
+            path.push(vertex);
+            current = vertex;
+        }
+        None
+    }
+
+    /// The shortest path along mesh edges inside the tile that meets no other spoke; refines until there is one.
+    fn detour(&mut self, tiled: &mut Tiled, site: VertexId, target: VertexId) -> Option<Vec<VertexId>> {
+        for _ in 0..4 {
+            if let Some(path) = self.search(tiled, site, target) {
+                return Some(path);
+            }
+            // Split every inner edge of the tile: afterwards each face has room beside its spokes.
+            let edges: Vec<[VertexId; 2]> = (0..tiled.tile_of_face.len() * 3)
+                .map(HalfEdgeId::new)
+                .filter(|&h| tiled.tile(h) == self.tile && tiled.refiner.twin(h).0 > h.0)
+                .filter(|&h| !tiled.is_border(h))
+                .map(|h| key(tiled.refiner.origin(h), tiled.refiner.target(h)))
+                .filter(|edge| !self.spoke_edges.contains(edge))
+                .collect();
+            for [a, b] in edges {
+                if let Some(h) = tiled.refiner.half_edge(a, b) {
+                    let place = self.map.at(a).lerp(self.map.at(b), 0.5);
+                    let vertex = tiled.split_edge(h, 0.5);
+                    self.map.places.insert(vertex, place);
+                }
+            }
+        }
+        None
+    }
+
+    fn search(&self, tiled: &Tiled, site: VertexId, target: VertexId) -> Option<Vec<VertexId>> {
+        let mut from: HashMap<VertexId, VertexId> = HashMap::from([(site, site)]);
+        let mut queue = VecDeque::from([site]);
+        while let Some(v) = queue.pop_front() {
+            for h in tiled.refiner.outgoing(v) {
+                let w = tiled.refiner.target(h);
+                let inside = tiled.tile(h) == self.tile && !tiled.is_border(h);
+                let free = w == target || (!self.border.contains(&w) && !self.on_spoke.contains(&w));
+                if inside && free && !from.contains_key(&w) {
+                    from.insert(w, v);
+                    if w == target {
+                        let mut path = vec![w];
+                        let mut at = w;
+                        while at != site {
+                            at = from[&at];
+                            path.push(at);
+                        }
+                        path.reverse();
+                        return Some(path);
+                    }
+                    queue.push_back(w);
+                }
+            }
+        }
+        None
+    }
+}
