@@ -1,0 +1,62 @@
+//! Where things are in the cache.
+
+use crate::hash::ContentHash;
+use std::path::{Path, PathBuf};
+
+/// The folders of a cache. Each carries the version of its content in its name, so that another version of the
+/// program starts an empty one beside it instead of misreading it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bucket {
+    /// `artifacts-v1/ab/cdef...`: artifact files under the hash of their header.
+    Artifacts,
+    /// `keys-v1/ab/cdef...`: the artifact that a stage run with this key gave; sealed JSON.
+    Keys,
+    /// `locks-v1/abcdef...`: held by the process that is computing this key. Removed when it is done.
+    Locks,
+    /// `files-v1/ab/cdef...`: size, times and hash of an input file under the hash of its path; sealed JSON.
+    Files,
+    /// `history-v1/ab/cdef...`: what each stage of a pipeline was last run with, under the hash of the pipeline's
+    /// path, to explain what has changed; sealed JSON.
+    History,
+    /// `exports-v1/ab/cdef...`: what was last written into an output folder, under the hash of its path; sealed JSON.
+    Exports,
+    /// `quarantine/`: files that did not verify, kept for a look.
+    Quarantine,
+}
+
+impl Bucket {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Artifacts,
+        Self::Keys,
+        Self::Locks,
+        Self::Files,
+        Self::History,
+        Self::Exports,
+        Self::Quarantine,
+    ];
+
+    /// The name of the folder.
+    pub const fn folder(self) -> &'static str {
+        match self {
+            Self::Artifacts => "artifacts-v1",
+            Self::Keys => "keys-v1",
+            Self::Locks => "locks-v1",
+            Self::Files => "files-v1",
+            Self::History => "history-v1",
+            Self::Exports => "exports-v1",
+            Self::Quarantine => "quarantine",
+        }
+    }
+
+    /// The file under `hash`. The first two digits are a folder of their own: some file systems are slow with very
+    /// many files in one.
+    pub(super) fn file(self, root: &Path, hash: ContentHash) -> PathBuf {
+        let hex = hash.to_hex();
+        let folder = root.join(self.folder());
+        match self {
+            Self::Locks | Self::Quarantine => folder.join(hex),
+            _ => folder.join(&hex[..2]).join(&hex[2..]),
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! The cache on disk: results that are found again by what they were made of.
+//!
+//! Nothing in it is trusted. Artifacts carry their hash in their name and header, records carry a checksum; what does
+//! not verify is moved aside, reported and made anew. Every file appears under its name in one step (written beside
+//! it, flushed, renamed), and the record that makes a result findable is published last, so a kill at any time leaves
+//! either a whole result or none.
+
+mod layout;
+mod lock;
+mod seal;
+mod store;
+
+pub use layout::Bucket;
+pub use lock::{KeyLock, LockError};
+pub(crate) use seal::{seal, unseal};
+pub(crate) use store::persist;
+pub use store::{Cache, CacheError, Damage, KeyRecord, StoredArtifact, Usage, write_atomically};

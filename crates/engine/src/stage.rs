@@ -1,0 +1,303 @@
+//! A stage: from parameters, artifacts and files to one artifact.
+
+use crate::artifact::{ArtifactKind, ArtifactType, Value};
+use crate::hash::ContentHash;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::marker::PhantomData;
+use std::sync::Arc;
+use topipe_progress::Progress;
+
+/// A field of a stage that names another stage, whose artifact it reads.
+#[derive(Debug, Clone)]
+pub struct InputPort {
+    /// The field in the spec.
+    pub name: &'static str,
+    /// What it accepts.
+    pub artifact: ArtifactType,
+    /// Whether it may be left out.
+    pub optional: bool,
+    /// One sentence for people.
+    pub doc: &'static str,
+}
+
+impl InputPort {
+    /// An input that must be given.
+    pub fn required<K: ArtifactKind>(name: &'static str, doc: &'static str) -> Self {
+        Self { name, artifact: ArtifactType::of::<K>(), optional: false, doc }
+    }
+
+    /// An input that may be left out.
+    pub fn optional<K: ArtifactKind>(name: &'static str, doc: &'static str) -> Self {
+        Self { name, artifact: ArtifactType::of::<K>(), optional: true, doc }
+    }
+}
+
+/// A field of a stage that names a file. The engine reads and hashes it before the stage runs, and the stage is
+/// handed the very bytes that were hashed; it opens nothing itself.
+#[derive(Debug, Clone)]
+pub struct FileField {
+    /// The field in the spec.
+    pub name: &'static str,
+    /// Whether it may be left out.
+    pub optional: bool,
+    /// One sentence for people.
+    pub doc: &'static str,
+}
+
+/// An external file as a stage sees it.
+#[derive(Debug, Clone)]
+pub struct SourceFile {
+    /// Its name without directories, for messages and to tell formats apart.
+    pub name: String,
+    /// Its content.
+    pub bytes: Arc<[u8]>,
+}
+
+/// Why a stage gave no result.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StageError {
+    /// The geometry or the data is not one this stage can work with. Exit code 3.
+    #[error("{0}")]
+    Refused(String),
+    /// A parameter is out of range, alone or together with others. Exit code 2.
+    #[error("{0}")]
+    BadParameter(String),
+    /// It went wrong: no convergence, a defect. Exit code 1.
+    #[error("{0}")]
+    Failed(String),
+    /// It was asked to stop. Exit code 130.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl From<topipe_progress::Interrupted> for StageError {
+    fn from(_: topipe_progress::Interrupted) -> Self {
+        Self::Interrupted
+    }
+}
+
+/// Joins an error and its causes into one line, leaving out causes that the text before already quotes.
+pub fn with_causes(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        let cause_text = cause.to_string();
+        if !text.contains(&cause_text) {
+            text = format!("{text}: {cause_text}");
+        }
+        source = cause.source();
+    }
+    text
+}
+
+/// What a running stage is given besides its parameters.
+pub struct StageContext<'a> {
+    pub(crate) inputs: BTreeMap<&'static str, Value>,
+    pub(crate) files: BTreeMap<&'static str, SourceFile>,
+    pub(crate) progress: &'a Progress,
+}
+
+impl StageContext<'_> {
+    /// The artifact at a required port.
+    pub fn input<K: ArtifactKind>(&self, port: &str) -> Result<Arc<K::Value>, StageError> {
+        self.optional_input::<K>(port)?.ok_or_else(|| {
+            StageError::Failed(format!("the stage asked for `{port}`, which is not connected"))
+        })
+    }
+
+    /// The artifact at an optional port.
+    pub fn optional_input<K: ArtifactKind>(&self, port: &str) -> Result<Option<Arc<K::Value>>, StageError> {
+        let Some(value) = self.inputs.get(port) else { return Ok(None) };
+        match Arc::clone(value).downcast::<K::Value>() {
+            Ok(value) => Ok(Some(value)),
+            Err(_) => Err(StageError::Failed(format!(
+                "the stage asked for `{port}` as a {}, which it is not",
+                K::NAME
+            ))),
+        }
+    }
+
+    /// The file named in a field.
+    pub fn file(&self, field: &str) -> Option<&SourceFile> {
+        self.files.get(field)
+    }
+
+    /// Where to report progress and ask for interruption.
+    pub fn progress(&self) -> &Progress {
+        self.progress
+    }
+}
+
+/// One kind of stage. Implementations are thin: the work is done by a library that knows nothing of the engine.
+pub trait Stage: Send + Sync + 'static {
+    /// Its parameters. Unknown fields must be denied and every field must have a default.
+    type Parameters: Serialize + DeserializeOwned + JsonSchema + Default + Send + Sync + 'static;
+    /// What it makes.
+    type Output: ArtifactKind;
+    /// The name after `kind =`.
+    const KIND: &'static str;
+    /// One sentence for people.
+    const SUMMARY: &'static str;
+
+    /// Identifies the code: it must change whenever the same input may give another result.
+    fn code_version(&self) -> String;
+    /// The fields that name other stages.
+    fn inputs(&self) -> Vec<InputPort>;
+    /// The fields that name files.
+    fn files(&self) -> Vec<FileField> {
+        Vec::new()
+    }
+    /// Computes the result. Must depend on nothing but its arguments.
+    fn run(
+        &self,
+        context: &StageContext<'_>,
+        parameters: &Self::Parameters,
+    ) -> Result<<Self::Output as ArtifactKind>::Value, StageError>;
+}
+
+/// Parameters of a stage with all defaults filled in.
+#[derive(Clone)]
+pub struct ResolvedParameters {
+    /// As JSON, for keys, reasons and records.
+    pub json: serde_json::Value,
+    typed: Arc<dyn Any + Send + Sync>,
+}
+
+impl ResolvedParameters {
+    /// The same parameters always give the same text: fields sorted by name, numbers in their shortest form.
+    pub(crate) fn canonical(&self) -> String {
+        canonical_json(&self.json)
+    }
+}
+
+/// JSON text with the fields of objects sorted by name.
+fn canonical_json(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::Object(fields) => {
+            let sorted: BTreeMap<&String, &serde_json::Value> = fields.iter().collect();
+            let fields: Vec<String> = sorted
+                .into_iter()
+                .map(|(name, value)| {
+                    format!("{}:{}", serde_json::Value::String(name.clone()), canonical_json(value))
+                })
+                .collect();
+            format!("{{{}}}", fields.join(","))
+        }
+        serde_json::Value::Array(items) => {
+            format!("[{}]", items.iter().map(canonical_json).collect::<Vec<_>>().join(","))
+        }
+        other => other.to_string(),
+    }
+}
+
+/// A [`Stage`] with its types erased.
+pub trait AnyStage: Send + Sync {
+    /// The name after `kind =`.
+    fn kind(&self) -> &'static str;
+    /// One sentence for people.
+    fn summary(&self) -> &'static str;
+    /// Identifies the code.
+    fn code_version(&self) -> String;
+    /// What it makes.
+    fn output(&self) -> ArtifactType;
+    /// The fields that name other stages.
+    fn inputs(&self) -> Vec<InputPort>;
+    /// The fields that name files.
+    fn files(&self) -> Vec<FileField>;
+    /// The JSON schema of the parameters.
+    fn schema(&self, generator: &mut SchemaGenerator) -> Schema;
+    /// All parameters at their defaults.
+    fn default_parameters(&self) -> serde_json::Value;
+    /// Checks and completes a table of parameters.
+    fn parse(&self, table: toml::de::Deserializer<'_>) -> Result<ResolvedParameters, toml::de::Error>;
+    /// Runs the stage.
+    fn run(&self, context: &StageContext<'_>, parameters: &ResolvedParameters) -> Result<Value, StageError>;
+}
+
+/// Erases the types of a [`Stage`].
+pub(crate) struct Erased<S: Stage>(pub(crate) S, pub(crate) PhantomData<fn() -> S>);
+
+impl<S: Stage> AnyStage for Erased<S> {
+    fn kind(&self) -> &'static str {
+        S::KIND
+    }
+
+    fn summary(&self) -> &'static str {
+        S::SUMMARY
+    }
+
+    fn code_version(&self) -> String {
+        self.0.code_version()
+    }
+
+    fn output(&self) -> ArtifactType {
+        ArtifactType::of::<S::Output>()
+    }
+
+    fn inputs(&self) -> Vec<InputPort> {
+        self.0.inputs()
+    }
+
+    fn files(&self) -> Vec<FileField> {
+        self.0.files()
+    }
+
+    fn schema(&self, generator: &mut SchemaGenerator) -> Schema {
+        S::Parameters::json_schema(generator)
+    }
+
+    fn default_parameters(&self) -> serde_json::Value {
+        // Parameters are plain data; where one cannot be written as JSON, `parse` reports it.
+        serde_json::to_value(S::Parameters::default()).unwrap_or_default()
+    }
+
+    fn parse(&self, table: toml::de::Deserializer<'_>) -> Result<ResolvedParameters, toml::de::Error> {
+        let typed = <S::Parameters as serde::Deserialize>::deserialize(table)?;
+        let json = serde_json::to_value(&typed).map_err(serde::de::Error::custom)?;
+        Ok(ResolvedParameters { json, typed: Arc::new(typed) })
+    }
+
+    fn run(&self, context: &StageContext<'_>, parameters: &ResolvedParameters) -> Result<Value, StageError> {
+        let typed = parameters
+            .typed
+            .downcast_ref::<S::Parameters>()
+            .ok_or_else(|| StageError::Failed("the parameters belong to another kind of stage".into()))?;
+        self.0.run(context, typed).map(|value| Arc::new(value) as Value)
+    }
+}
+
+/// Everything the key of a stage run is made of.
+pub(crate) struct KeyParts<'a> {
+    pub(crate) kind: &'a str,
+    pub(crate) code_version: &'a str,
+    pub(crate) output: ArtifactType,
+    pub(crate) parameters: &'a ResolvedParameters,
+    /// Port name and content hash, for the ports that are connected.
+    pub(crate) inputs: &'a BTreeMap<&'static str, ContentHash>,
+    /// Field name, ending of the file's name (it selects the parser) and content hash.
+    pub(crate) files: &'a BTreeMap<&'static str, (String, ContentHash)>,
+}
+
+impl KeyParts<'_> {
+    /// The key: equal for equal work, whatever the paths, the time, the machine and the number of threads.
+    pub(crate) fn key(&self) -> ContentHash {
+        let mut hasher = crate::hash::FieldHasher::new("topipe stage key 1");
+        hasher.text(self.kind).text(self.code_version);
+        hasher.text(self.output.name).text(&self.output.version.to_string());
+        hasher.text(&self.parameters.canonical());
+        hasher.text(&self.inputs.len().to_string());
+        for (port, hash) in self.inputs {
+            hasher.text(port).bytes(hash.as_bytes());
+        }
+        hasher.text(&self.files.len().to_string());
+        for (field, (ending, hash)) in self.files {
+            hasher.text(field).text(ending).bytes(hash.as_bytes());
+        }
+        hasher.finish()
+    }
+}
