@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::time::Instant;
 use topipe_mesh::{Connectivity, Design, Part, RegionShape, TriangleMesh};
 use topipe_progress::Progress;
-use topipe_smoothing::{Parameters, smooth};
+use topipe_smoothing::{Method, Parameters, smooth};
 
 fn read_off(text: &str) -> TriangleMesh {
     let mut numbers = text.split_ascii_whitespace().skip(1);
@@ -45,6 +45,46 @@ fn quality(mesh: &TriangleMesh) -> String {
     format!("folded {flipped}, dihedral <20/45/80/120/more {bins:?}, largest {largest:.1}")
 }
 
+/// Percentiles of the dihedral angle inside the free surface, and of the smallest angle of its triangles.
+fn free_surface(mesh: &TriangleMesh, part: &Part) -> String {
+    let c = Connectivity::build(mesh).expect("a manifold");
+    let free = |f: topipe_mesh::FaceId| {
+        !part.region_of_face[f.index()].is_some()
+            && mesh.triangles[f.index()].iter().any(|v| !part.frozen[v.index()])
+    };
+    let mut inside = Vec::new();
+    let mut kinks = Vec::new();
+    for h in c.edges() {
+        let (f, g) = (h.face(), c.twin(h).face());
+        let angle = mesh.normal(f).dot(mesh.normal(g)).clamp(-1.0, 1.0).acos().to_degrees();
+        match (free(f), free(g)) {
+            (true, true) => inside.push(angle),
+            (false, false) => {}
+            _ => kinks.push(angle),
+        }
+    }
+    let mut smallest = Vec::new();
+    for f in mesh.faces().filter(|&f| free(f)) {
+        let p = mesh.corners(f);
+        let angle = (0..3).map(|k| (p[(k + 1) % 3] - p[k]).angle_between(p[(k + 2) % 3] - p[k]).to_degrees());
+        smallest.push(angle.fold(180.0, f64::min));
+    }
+    let percentiles = |values: &mut Vec<f64>, shares: [f64; 5]| {
+        values.sort_by(f64::total_cmp);
+        shares.map(|s| {
+            let at = ((values.len() as f64 * s) as usize).min(values.len().saturating_sub(1));
+            values.get(at).map_or(0, |v| v.round() as i32)
+        })
+    };
+    let shares = [0.5, 0.9, 0.99, 0.999, 1.0];
+    format!(
+        "dihedral 50/90/99/99.9/100 % {:?}, at its border {:?}, smallest angle 0/0.1/1/10/50 % {:?}",
+        percentiles(&mut inside, shares),
+        percentiles(&mut kinks, shares),
+        percentiles(&mut smallest, [0.0, 0.001, 0.01, 0.1, 0.5])
+    )
+}
+
 fn main() {
     let mut write = None;
     let mut parameters = Parameters::default();
@@ -58,6 +98,20 @@ fn main() {
             "--tolerance" => parameters.tolerance = value().parse().expect("a number"),
             "--floor" => parameters.weight_floor = value().parse().expect("a number"),
             "--iterations" => parameters.iterations = Some(value().parse().expect("a number")),
+            "--lambda" => parameters.lambda = value().parse().expect("a number"),
+            "--keep-volume" => parameters.preserve_volume = Some(true),
+            "--updated" => parameters.weights = topipe_smoothing::Weights::Updated,
+            "--method" => {
+                parameters.method = match value().as_str() {
+                    "laplacian" => Method::Laplacian,
+                    "sdu" => Method::Sdu,
+                    "hc" => Method::Hc,
+                    "taubin" => Method::Taubin,
+                    "contract" => Method::Contract,
+                    _ => Method::HcSdu,
+                }
+            }
+            "--plane-area" => parameters.plane_area = value().parse().expect("a number"),
             "--no-slide" => parameters.slide_outlines = false,
             _ => case(&path, &parameters, write.as_deref()),
         }
@@ -112,6 +166,8 @@ fn case(path: &str, parameters: &Parameters, write: Option<&str>) {
     );
     println!("  before: {}", quality(&part.mesh));
     println!("  after:  {}", quality(&smoothed.mesh));
+    println!("  free surface before: {}", free_surface(&part.mesh, &smoothed));
+    println!("  free surface after:  {}", free_surface(&smoothed.mesh, &smoothed));
     if let Some(directory) = write {
         let name = path.rsplit('/').next().unwrap_or(path);
         let mut text = format!("OFF\n{} {} 0\n", smoothed.mesh.vertex_count(), smoothed.mesh.face_count());

@@ -102,8 +102,8 @@ pub(crate) fn weighted_umbrella(positions: &[DVec3], vertex: usize, row: &[u32],
 /// 1 / length^2 and the same part in metres would blow up.
 ///
 /// Lengths below `floor` of the row's mean count as that. Without it the two ends of a very short edge see nothing
-/// but each other, and with `lambda` > 0.5 change places: on the bracket (shortest edge 1/28 of the mean) that
-/// turned triangles over.
+/// but each other, and with `lambda` > 0.5 change places in every step: on the bracket (shortest edge 1/28 of the mean)
+/// the smallest angle of a triangle after smoothing was 1 degree with a floor of 0, and 8 degrees with 0.5.
 pub(crate) fn scale_dependent(domain: &Domain, positions: &[DVec3], floor: f64, weights: &mut Vec<f64>) {
     weights.resize(domain.neighbors.len(), 0.0);
     // Rows differ in length, so chunks of vertices are cut out of the flat array by hand.

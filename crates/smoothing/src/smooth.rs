@@ -35,7 +35,7 @@ pub fn smooth(part: &Part, parameters: &Parameters, progress: &Progress) -> Resu
             if -parameters.mu < parameters.lambda { "shrink" } else { "grow" }
         ));
     }
-    let features = features::detect(part, &connectivity, parameters, progress)?;
+    let mut features = features::detect(part, &connectivity, parameters, progress)?;
     let mut result = part.clone();
     let mut record =
         SmoothingRecord { method: parameters.method.name().to_owned(), ..SmoothingRecord::default() };
@@ -47,11 +47,10 @@ pub fn smooth(part: &Part, parameters: &Parameters, progress: &Progress) -> Resu
         iterate(part, &connectivity, &domain, parameters, progress, &mut result, &mut record)?;
     }
     let solid: Vec<bool> = mesh.triangles.iter().map(|t| t.iter().all(|v| frozen[v.index()])).collect();
+    features.measure(&result.mesh);
     result.feature_edges =
         part.feature_edges.iter().filter(|e| e.kind == FeatureKind::User).copied().collect();
-    for edge in
-        features::feature_edges(&result.mesh, &connectivity, &features, &solid, parameters.sharp_angle)
-    {
+    for edge in features::feature_edges(&result.mesh, &connectivity, &features, &solid, parameters) {
         if !part.feature_edges.iter().any(|e| e.kind == FeatureKind::User && e.vertices == edge.vertices) {
             result.feature_edges.push(edge);
         }
@@ -86,15 +85,12 @@ fn check_attributes(part: &Part) -> Result<(), SmoothingError> {
 /// Which vertices must not move.
 fn frozen(part: &Part, parameters: &Parameters, features: &Features) -> Vec<bool> {
     let mut frozen = part.frozen.clone();
-    // Contraction must be able to take flat faces with it.
-    if parameters.method != Method::Contract {
-        for (frozen, on_region) in frozen.iter_mut().zip(&features.on_region) {
-            *frozen |= on_region;
-        }
-        if parameters.slide_outlines {
-            for slide in &features.outline {
-                frozen[slide.vertex as usize] = part.frozen[slide.vertex as usize];
-            }
+    for (frozen, on_region) in frozen.iter_mut().zip(&features.on_region) {
+        *frozen |= on_region;
+    }
+    if parameters.slide_outlines {
+        for slide in &features.outline {
+            frozen[slide.vertex as usize] = part.frozen[slide.vertex as usize];
         }
     }
     if parameters.freeze_non_design {

@@ -5,6 +5,7 @@
 //! dihedral angle there.
 
 use super::Features;
+use crate::Parameters;
 use topipe_mesh::{
     Connectivity, FeatureEdge, FeatureKind, HalfEdgeId, RegionId, RegionShape, TriangleMesh, VertexId,
 };
@@ -14,20 +15,19 @@ const SHORTEST_CHAIN: f64 = 4.0;
 
 /// The feature edges of a mesh with these regions, sorted by their vertices.
 ///
-/// `solid` says which faces are frozen in the sense of being exact: all their vertices are. `sharp_angle` is in
-/// degrees.
+/// `solid` says which faces are frozen in the sense of being exact: all their vertices are.
 pub fn feature_edges(
     mesh: &TriangleMesh,
     connectivity: &Connectivity,
     features: &Features,
     solid: &[bool],
-    sharp_angle: f64,
+    parameters: &Parameters,
 ) -> Vec<FeatureEdge> {
-    let cosine = sharp_angle.to_radians().cos();
+    let cosine = parameters.sharp_angle.to_radians().cos();
     let is_hole = |r: RegionId| {
         r.is_some() && matches!(features.regions[r.index()].shape, RegionShape::Cylinder { hole: true, .. })
     };
-    let mut sharp: Vec<(HalfEdgeId, f64)> = Vec::new();
+    let mut sharp: Vec<(HalfEdgeId, f64, FeatureKind)> = Vec::new();
     let mut edges = Vec::new();
     for h in connectivity.edges() {
         let twin = connectivity.twin(h);
@@ -43,25 +43,32 @@ pub fn feature_edges(
             edges.push(edge(connectivity, h, FeatureKind::HoleRim));
             continue;
         }
-        let known = |r: RegionId, face: usize| r.is_some() || solid[face];
-        if known(here, f.index()) && known(there, g.index()) && mesh.normal(f).dot(mesh.normal(g)) <= cosine {
-            let length =
-                mesh.position(connectivity.origin(h)).distance(mesh.position(connectivity.target(h)));
-            sharp.push((h, length));
+        if mesh.normal(f).dot(mesh.normal(g)) > cosine {
+            continue;
         }
+        let known = |r: RegionId, face: usize| r.is_some() || solid[face];
+        let kind = if known(here, f.index()) && known(there, g.index()) {
+            FeatureKind::Sharp
+        } else if parameters.outlines_as_features && (here.is_some() || there.is_some()) {
+            FeatureKind::RegionBorder
+        } else {
+            continue;
+        };
+        let length = mesh.position(connectivity.origin(h)).distance(mesh.position(connectivity.target(h)));
+        sharp.push((h, length, kind));
     }
     let shortest = SHORTEST_CHAIN * mesh.mean_edge_length();
     let mut chains = Chains { parent: (0..mesh.vertex_count() as u32).collect() };
-    for &(h, _) in &sharp {
+    for &(h, ..) in &sharp {
         chains.join(connectivity.origin(h), connectivity.target(h));
     }
     let mut lengths = vec![0.0; mesh.vertex_count()];
-    for &(h, length) in &sharp {
+    for &(h, length, _) in &sharp {
         lengths[chains.root(connectivity.origin(h).0) as usize] += length;
     }
-    for &(h, _) in &sharp {
+    for &(h, _, kind) in &sharp {
         if lengths[chains.root(connectivity.origin(h).0) as usize] >= shortest {
-            edges.push(edge(connectivity, h, FeatureKind::Sharp));
+            edges.push(edge(connectivity, h, kind));
         }
     }
     edges.sort_unstable_by_key(|e| e.vertices);

@@ -15,8 +15,10 @@ mod edges;
 mod fit;
 mod plane;
 
-use crate::{Parameters, SmoothingError};
-use topipe_mesh::{Connectivity, DVec3, FaceId, HalfEdgeId, Part, Region, RegionId, RegionShape};
+use crate::{Method, Parameters, SmoothingError};
+use topipe_mesh::{
+    Connectivity, DVec3, FaceId, HalfEdgeId, Part, Region, RegionId, RegionShape, TriangleMesh,
+};
 use topipe_progress::Progress;
 
 pub use edges::feature_edges;
@@ -48,6 +50,7 @@ pub struct OutlineVertex {
 /// Finds the flat faces and the holes of `part`, as far as `parameters` ask for them.
 ///
 /// Regions that the part already has are kept and taken as given; the detectors look at the remaining faces.
+/// Nothing is looked for, and nothing kept, when the part is to be contracted.
 pub fn detect(
     part: &Part,
     connectivity: &Connectivity,
@@ -55,6 +58,15 @@ pub fn detect(
     progress: &Progress,
 ) -> Result<Features, SmoothingError> {
     let mesh = &part.mesh;
+    if parameters.method == Method::Contract {
+        // What contracts does not keep its shapes.
+        return Ok(Features {
+            regions: Vec::new(),
+            region_of_face: vec![RegionId::NONE; mesh.face_count()],
+            on_region: vec![false; mesh.vertex_count()],
+            outline: Vec::new(),
+        });
+    }
     let mut regions = part.regions.clone();
     let mut region_of_face = part.region_of_face.clone();
     if parameters.detect_holes {
@@ -88,6 +100,32 @@ fn add(regions: &mut Vec<Region>, region_of_face: &mut [RegionId], region: Regio
     regions.push(region);
     for f in faces {
         region_of_face[f.index()] = id;
+    }
+}
+
+impl Features {
+    /// Measures area and residual of the regions again, after vertices have moved.
+    pub fn measure(&mut self, mesh: &TriangleMesh) {
+        for region in &mut self.regions {
+            (region.area, region.residual) = (0.0, 0.0);
+        }
+        for f in mesh.faces() {
+            let id = self.region_of_face[f.index()];
+            if !id.is_some() {
+                continue;
+            }
+            let region = &mut self.regions[id.index()];
+            region.area += mesh.area_vector(f).length() / 2.0;
+            for p in mesh.corners(f) {
+                let distance = match region.shape {
+                    RegionShape::Plane { point, normal } => normal.dot(p - point),
+                    RegionShape::Cylinder { point, axis, radius, .. } => {
+                        fit::Cylinder { point, axis, radius }.distance(p)
+                    }
+                };
+                region.residual = region.residual.max(distance.abs());
+            }
+        }
     }
 }
 

@@ -2,6 +2,10 @@
 //!
 //! Sorkine, "Laplacian mesh processing", 2005; Bacciaglia et al. 2021, section 2.2. Each step lowers the sum of squared
 //! edge vectors, so it converges, to a collapsed mesh where nothing is frozen.
+//!
+//! It is the step of `contract` too: a skeleton thesis calls its contraction "Jiao 2012", a reference that could not be
+//! identified, and describes what plain umbrella steps with frozen interfaces do. A skeleton computed from a contracted
+//! mesh is less centred than one from the part itself (0.0215 against 0.0120 in that thesis).
 
 use super::Step;
 use crate::kernel::{Domain, umbrella};

@@ -1,6 +1,5 @@
 //! The methods: each is one step from a state of the mesh to the next.
 
-mod contract;
 mod hc;
 mod hc_sdu;
 mod laplacian;
@@ -20,11 +19,11 @@ pub(crate) trait Step {
 /// The method that `parameters` name, ready for a mesh with these positions.
 pub(crate) fn choose(parameters: &Parameters, domain: &Domain, original: &[DVec3]) -> Box<dyn Step> {
     match parameters.method {
-        Method::Laplacian => Box::new(laplacian::Laplacian { lambda: parameters.lambda }),
+        // Contraction differs from it in what is frozen and in how long it runs, not in the step.
+        Method::Laplacian | Method::Contract => Box::new(laplacian::Laplacian { lambda: parameters.lambda }),
         Method::Sdu => Box::new(sdu::Sdu::new(parameters, domain, original)),
         Method::Hc => Box::new(hc::Hc::new(parameters, original.len())),
         Method::Taubin => Box::new(taubin::Taubin::new(parameters, original.len())),
         Method::HcSdu => Box::new(hc_sdu::HcSdu::new(parameters, domain, original)),
-        Method::Contract => Box::new(contract::Contract),
     }
 }
