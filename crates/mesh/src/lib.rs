@@ -10,11 +10,13 @@
 pub mod connectivity;
 pub mod disk_map;
 pub mod ids;
+pub mod import;
 pub mod measures;
 pub mod part;
 pub mod refine;
 pub mod spatial;
 pub mod triangle_mesh;
+pub mod write;
 
 pub use connectivity::{Connectivity, ConnectivityError};
 pub use glam::DVec3;

@@ -1,0 +1,197 @@
+//! The mesh between parsing and the finished part.
+
+use super::soup::Soup;
+use crate::{Provenance, Repair, TriangleMesh, VertexId};
+use glam::DVec3;
+
+/// A mesh under repair. Positions are those of the file until the very end, so that messages name places as the
+/// user's other programs do.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Draft {
+    pub(super) mesh: TriangleMesh,
+    /// One per vertex, in terms of the file.
+    pub(super) provenance: Vec<Provenance>,
+    /// One per triangle: the face of the file it is, or is part of.
+    pub(super) face_of: Vec<u32>,
+    pub(super) repairs: Vec<Repair>,
+}
+
+impl Draft {
+    pub(super) fn note(&mut self, what: &str, count: usize) {
+        if count > 0 {
+            self.repairs.push(Repair { what: what.to_owned(), count: count as u64 });
+        }
+    }
+
+    /// Keeps the triangles for which `keep` is true.
+    pub(super) fn retain_faces(&mut self, keep: impl Fn(usize) -> bool) {
+        let mut index = 0;
+        self.mesh.triangles.retain(|_| {
+            index += 1;
+            keep(index - 1)
+        });
+        index = 0;
+        self.face_of.retain(|_| {
+            index += 1;
+            keep(index - 1)
+        });
+    }
+
+    /// Removes vertices without faces; the others keep their order. Returns how many were removed.
+    pub(super) fn drop_unused_vertices(&mut self) -> usize {
+        let count = self.mesh.vertex_count();
+        let mut used = vec![false; count];
+        for v in self.mesh.triangles.iter().flatten() {
+            used[v.index()] = true;
+        }
+        if used.iter().all(|&u| u) {
+            return 0;
+        }
+        let mut renumbered = vec![VertexId::NONE; count];
+        let mut next = 0;
+        for v in 0..count {
+            if used[v] {
+                self.mesh.positions[next] = self.mesh.positions[v];
+                self.provenance[next] = self.provenance[v];
+                renumbered[v] = VertexId::new(next);
+                next += 1;
+            }
+        }
+        self.mesh.positions.truncate(next);
+        self.provenance.truncate(next);
+        for v in self.mesh.triangles.iter_mut().flatten() {
+            *v = renumbered[v.index()];
+        }
+        count - next
+    }
+}
+
+/// Makes one vertex of those with equal coordinates, or that are nearer to each other than `tolerance`; drops the
+/// triangles that lose a corner by it, and vertices without faces.
+pub(super) fn weld(soup: Soup, tolerance: f64) -> Draft {
+    let Soup { unindexed, mut positions, triangles, face_of, repairs, .. } = soup;
+    let mut draft = Draft { repairs, ..Draft::default() };
+    for p in &mut positions {
+        // Minus zero and zero are the same place.
+        *p += DVec3::ZERO;
+    }
+    let exact = Welded::equal(&positions);
+    if !unindexed {
+        // In an STL every corner brings its own point: only for other formats are equal points a defect.
+        draft.note("welded vertices with equal coordinates", positions.len() - exact.first.len());
+    }
+    let mut vertex_of = exact.of;
+    draft.mesh.positions = exact.first.iter().map(|&v| positions[v as usize]).collect();
+    draft.provenance = exact.first.iter().map(|&v| Provenance::Vertex(VertexId(v))).collect();
+    drop(positions);
+    if tolerance > 0.0 {
+        let near = nearer_than(&draft.mesh.positions, tolerance);
+        let merged = near.iter().enumerate().filter(|&(v, &to)| to as usize != v).count();
+        draft.note("welded vertices closer than the tolerance", merged);
+        for v in &mut vertex_of {
+            *v = near[*v as usize];
+        }
+    }
+    draft.mesh.triangles = triangles.iter().map(|t| t.map(|v| VertexId(vertex_of[v as usize]))).collect();
+    draft.face_of = face_of;
+    let collapsed: Vec<bool> =
+        draft.mesh.triangles.iter().map(|&[a, b, c]| a == b || b == c || c == a).collect();
+    let count = collapsed.iter().filter(|&&c| c).count();
+    if count > 0 {
+        draft.retain_faces(|f| !collapsed[f]);
+        draft.note("dropped faces with a repeated corner", count);
+    }
+    let unused = draft.drop_unused_vertices();
+    if !unindexed && tolerance == 0.0 {
+        draft.note("dropped vertices without faces", unused);
+    }
+    draft
+}
+
+/// Which points are one.
+struct Welded {
+    /// The new vertex of each point.
+    of: Vec<u32>,
+    /// The first point of each new vertex.
+    first: Vec<u32>,
+}
+
+impl Welded {
+    /// Points with the same bits, numbered by first appearance: open addressing with linear probing.
+    fn equal(positions: &[DVec3]) -> Self {
+        const FREE: u32 = u32::MAX;
+        let mut table = vec![FREE; 1024];
+        let mut first: Vec<u32> = Vec::new();
+        let mut of = Vec::with_capacity(positions.len());
+        let slot_of = |p: DVec3, mask: usize| {
+            let mut hash = 0u64;
+            for x in p.to_array() {
+                // The finalizer of MurmurHash3: coordinates on a grid differ in few bits.
+                hash ^= x.to_bits();
+                hash = (hash ^ (hash >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd);
+                hash = (hash ^ (hash >> 33)).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
+            }
+            (hash ^ (hash >> 33)) as usize & mask
+        };
+        for (k, &p) in positions.iter().enumerate() {
+            if 2 * first.len() >= table.len() {
+                table = vec![FREE; table.len() * 2];
+                let mask = table.len() - 1;
+                for (v, &f) in first.iter().enumerate() {
+                    let mut slot = slot_of(positions[f as usize], mask);
+                    while table[slot] != FREE {
+                        slot = (slot + 1) & mask;
+                    }
+                    table[slot] = v as u32;
+                }
+            }
+            let mask = table.len() - 1;
+            let mut slot = slot_of(p, mask);
+            loop {
+                match table[slot] {
+                    FREE => {
+                        table[slot] = first.len() as u32;
+                        of.push(first.len() as u32);
+                        first.push(k as u32);
+                        break;
+                    }
+                    v if positions[first[v as usize] as usize] == p => {
+                        of.push(v);
+                        break;
+                    }
+                    _ => slot = (slot + 1) & mask,
+                }
+            }
+        }
+        Self { of, first }
+    }
+}
+
+/// For each point the earliest point that it is taken for: itself, or one within `tolerance` that stays.
+fn nearer_than(positions: &[DVec3], tolerance: f64) -> Vec<u32> {
+    // Cells as wide as the tolerance, sorted: the points that stay are found in the 27 cells around.
+    let cell = |p: DVec3| (p / tolerance).floor().to_array().map(|x| x as i64);
+    let mut stays: std::collections::BTreeMap<[i64; 3], Vec<u32>> = std::collections::BTreeMap::new();
+    let mut taken_for = Vec::with_capacity(positions.len());
+    for (v, &p) in positions.iter().enumerate() {
+        let [x, y, z] = cell(p);
+        let mut earliest = v as u32;
+        for dx in -1..=1 {
+            for dy in -1..=1 {
+                for dz in -1..=1 {
+                    let key = [x.saturating_add(dx), y.saturating_add(dy), z.saturating_add(dz)];
+                    for &w in stays.get(&key).into_iter().flatten() {
+                        if w < earliest && positions[w as usize].distance(p) <= tolerance {
+                            earliest = w;
+                        }
+                    }
+                }
+            }
+        }
+        if earliest == v as u32 {
+            stays.entry([x, y, z]).or_default().push(earliest);
+        }
+        taken_for.push(earliest);
+    }
+    taken_for
+}

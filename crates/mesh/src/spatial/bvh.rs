@@ -1,0 +1,367 @@
+//! A bounding volume hierarchy over the triangles of a mesh.
+//!
+//! Built top down with the binned surface area heuristic (Wald, "On fast construction of SAH-based bounding volume
+//! hierarchies", 2007), stored as one flat array with siblings side by side. The corner points of the triangles are
+//! copied in leaf order, so that a query reads memory forwards.
+
+use super::triangle::{Crossing, closest_point_on_triangle, cross};
+use crate::{FaceId, TriangleMesh};
+use glam::DVec3;
+
+/// Triangles in a leaf at most, where splitting further does not pay.
+const LEAF: usize = 4;
+/// Bins of the surface area heuristic.
+const BINS: usize = 16;
+/// Below this depth nodes are split in the middle of the list, so that the depth stays bounded by this plus 32.
+const SAH_DEPTH: u32 = 60;
+/// Room for one sibling per level.
+const STACK: usize = SAH_DEPTH as usize + 36;
+
+/// Directions for [`SurfaceIndex::contains`]: far from the axes and diagonals that meshes are aligned with.
+const DIRECTIONS: [DVec3; 6] = [
+    DVec3::new(0.5377, 0.3121, 0.7832),
+    DVec3::new(-0.2839, 0.8437, 0.4557),
+    DVec3::new(0.7713, -0.5901, 0.2386),
+    DVec3::new(-0.6127, -0.3643, -0.7013),
+    DVec3::new(0.1733, 0.6581, -0.7327),
+    DVec3::new(-0.8839, 0.1427, 0.4453),
+];
+
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    low: DVec3,
+    high: DVec3,
+    /// Leaf: the first triangle. Inner node: the first of its two children.
+    first: u32,
+    /// Triangles of a leaf; 0 for an inner node.
+    count: u32,
+}
+
+impl Node {
+    #[inline]
+    fn distance_squared(&self, p: DVec3) -> f64 {
+        (self.low - p).max(p - self.high).max(DVec3::ZERO).length_squared()
+    }
+
+    /// Where the ray enters the box, or infinity if it misses it or enters beyond `limit`.
+    #[inline]
+    fn entry(&self, origin: DVec3, inverse: DVec3, limit: f64) -> f64 {
+        let (t0, t1) = ((self.low - origin) * inverse, (self.high - origin) * inverse);
+        // `f64::min` and `max` pass over the NaN of 0 * infinity: a ray in the plane of a side counts as inside it.
+        let (mut enter, mut leave) = (0.0f64, limit);
+        for k in 0..3 {
+            enter = enter.max(t0[k].min(t1[k]));
+            leave = leave.min(t0[k].max(t1[k]));
+        }
+        // A little slack: rounding must not lose a triangle that lies in a side of its box.
+        if enter <= leave * (1.0 + 4.0 * f64::EPSILON) { enter } else { f64::INFINITY }
+    }
+}
+
+/// The answer of [`SurfaceIndex::nearest`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestPoint {
+    /// Distance from the query to `point`.
+    pub distance: f64,
+    /// The nearest point of the surface.
+    pub point: DVec3,
+    /// The face it lies on; of several at the same distance the one with the lowest id.
+    pub face: FaceId,
+}
+
+/// The answer of [`SurfaceIndex::ray`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RayHit {
+    /// Distance from the origin of the ray.
+    pub distance: f64,
+    /// Where the ray meets the surface.
+    pub point: DVec3,
+    /// The face that is met; of several at the same distance the one with the lowest id.
+    pub face: FaceId,
+}
+
+/// A snapshot of a surface, arranged for queries.
+#[derive(Debug, Clone)]
+pub struct SurfaceIndex {
+    nodes: Vec<Node>,
+    faces: Vec<FaceId>,
+    corners: Vec<[DVec3; 3]>,
+}
+
+impl SurfaceIndex {
+    /// Arranges the faces of `mesh`; positions must be finite. `O(n log n)`.
+    pub fn build(mesh: &TriangleMesh) -> Self {
+        let mut builder = Builder {
+            boxes: mesh
+                .faces()
+                .map(|f| {
+                    let [a, b, c] = mesh.corners(f);
+                    (a.min(b).min(c), a.max(b).max(c))
+                })
+                .collect(),
+            order: (0..mesh.face_count() as u32).collect(),
+            nodes: Vec::with_capacity(mesh.face_count() + 1),
+        };
+        builder.build();
+        let faces: Vec<FaceId> = builder.order.into_iter().map(FaceId).collect();
+        let corners = faces.iter().map(|&f| mesh.corners(f)).collect();
+        Self { nodes: builder.nodes, faces, corners }
+    }
+
+    /// True for an index without faces.
+    pub fn is_empty(&self) -> bool {
+        self.faces.is_empty()
+    }
+
+    /// The corners of the bounding box of all faces; zeros without faces.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        self.nodes.first().map_or((DVec3::ZERO, DVec3::ZERO), |n| (n.low, n.high))
+    }
+
+    /// The point of the surface nearest to `point`. `None` without faces or for a point that is not finite.
+    pub fn nearest(&self, point: DVec3) -> Option<NearestPoint> {
+        self.nearest_within(point, f64::INFINITY)
+    }
+
+    /// As [`Self::nearest`], but `None` where the surface is farther away than `limit`.
+    pub fn nearest_within(&self, point: DVec3, limit: f64) -> Option<NearestPoint> {
+        let root = self.nodes.first()?;
+        if !point.is_finite() {
+            return None;
+        }
+        let mut best = limit * limit;
+        let mut found: Option<(DVec3, FaceId)> = None;
+        let mut stack = [(0u32, 0.0f64); STACK];
+        stack[0] = (0, root.distance_squared(point));
+        let mut depth = 1;
+        while depth > 0 {
+            depth -= 1;
+            let (index, distance) = stack[depth];
+            if distance > best {
+                continue;
+            }
+            let node = &self.nodes[index as usize];
+            if node.count > 0 {
+                let range = node.first as usize..(node.first + node.count) as usize;
+                for slot in range {
+                    let q = closest_point_on_triangle(point, self.corners[slot]);
+                    let d = point.distance_squared(q);
+                    let face = self.faces[slot];
+                    if d < best || (d == best && found.is_none_or(|(_, f)| face < f)) {
+                        best = d;
+                        found = Some((q, face));
+                    }
+                }
+                continue;
+            }
+            let (near, far) = (node.first, node.first + 1);
+            let near_distance = self.nodes[near as usize].distance_squared(point);
+            let far_distance = self.nodes[far as usize].distance_squared(point);
+            let mut children = [(near, near_distance), (far, far_distance)];
+            if near_distance > far_distance {
+                children.swap(0, 1);
+            }
+            stack[depth] = children[1];
+            stack[depth + 1] = children[0];
+            depth += 2;
+        }
+        found.map(|(q, face)| NearestPoint { distance: best.sqrt(), point: q, face })
+    }
+
+    /// The first place where the ray meets the surface, from either side, within `limit` (a length; may be infinite).
+    ///
+    /// `direction` need not be a unit vector. Edges and corners count as hits. `None` for a direction without length.
+    pub fn ray(&self, origin: DVec3, direction: DVec3, limit: f64) -> Option<RayHit> {
+        let direction = direction.try_normalize()?;
+        let mut best = limit;
+        let mut found: Option<FaceId> = None;
+        self.visit_ray(origin, direction, &mut best, |slot, best| {
+            if let Crossing::Hit(t) | Crossing::Grazing(t) = cross(origin, direction, self.corners[slot])
+                && t >= 0.0
+                && (t < *best || (t == *best && found.is_none_or(|f| self.faces[slot] < f)))
+            {
+                *best = t;
+                found = Some(self.faces[slot]);
+            }
+            true
+        });
+        found.map(|face| RayHit { distance: best, point: origin + direction * best, face })
+    }
+
+    /// Whether `point` is inside a closed surface: whether a ray from it crosses the surface an odd number of times.
+    ///
+    /// The orientation of the faces does not matter. A point on the surface may get either answer. A ray that passes
+    /// too close to an edge is given up for one in another direction.
+    pub fn contains(&self, point: DVec3) -> bool {
+        let Some(root) = self.nodes.first() else { return false };
+        // Not `>`: a coordinate that is not a number must be outside.
+        if !(point.cmpge(root.low).all() && point.cmple(root.high).all()) {
+            return false;
+        }
+        let mut odd = 0;
+        for direction in DIRECTIONS {
+            let direction = direction.normalize();
+            let mut crossings = 0u32;
+            let mut grazed = false;
+            let mut limit = f64::INFINITY;
+            self.visit_ray(point, direction, &mut limit, |slot, _| {
+                match cross(point, direction, self.corners[slot]) {
+                    Crossing::Hit(t) if t >= 0.0 => crossings += 1,
+                    Crossing::Grazing(t) if t >= 0.0 => grazed = true,
+                    _ => {}
+                }
+                !grazed
+            });
+            if !grazed {
+                return crossings % 2 == 1;
+            }
+            odd += crossings % 2;
+        }
+        odd as usize * 2 > DIRECTIONS.len()
+    }
+
+    /// Hands the triangles of all leaves that the ray enters before `limit` to `visit`, nearer boxes first, until it
+    /// returns false. `visit` may lower the limit.
+    fn visit_ray(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        limit: &mut f64,
+        mut visit: impl FnMut(usize, &mut f64) -> bool,
+    ) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let inverse = direction.recip();
+        let mut stack = [(0u32, 0.0f64); STACK];
+        stack[0] = (0, self.nodes[0].entry(origin, inverse, *limit));
+        let mut depth = 1;
+        while depth > 0 {
+            depth -= 1;
+            let (index, entry) = stack[depth];
+            if entry > *limit || entry == f64::INFINITY {
+                continue;
+            }
+            let node = &self.nodes[index as usize];
+            if node.count > 0 {
+                for slot in node.first as usize..(node.first + node.count) as usize {
+                    if !visit(slot, limit) {
+                        return;
+                    }
+                }
+                continue;
+            }
+            let (near, far) = (node.first, node.first + 1);
+            let mut children = [
+                (near, self.nodes[near as usize].entry(origin, inverse, *limit)),
+                (far, self.nodes[far as usize].entry(origin, inverse, *limit)),
+            ];
+            if children[0].1 > children[1].1 {
+                children.swap(0, 1);
+            }
+            stack[depth] = children[1];
+            stack[depth + 1] = children[0];
+            depth += 2;
+        }
+    }
+}
+
+struct Builder {
+    boxes: Vec<(DVec3, DVec3)>,
+    order: Vec<u32>,
+    nodes: Vec<Node>,
+}
+
+impl Builder {
+    fn build(&mut self) {
+        if self.order.is_empty() {
+            return;
+        }
+        self.nodes.push(self.leaf(0, self.order.len()));
+        let mut open = vec![(0usize, 0u32)];
+        while let Some((index, depth)) = open.pop() {
+            let (first, count) = (self.nodes[index].first as usize, self.nodes[index].count as usize);
+            let Some(middle) = self.split(first, count, depth) else { continue };
+            let child = self.nodes.len();
+            self.nodes.push(self.leaf(first, middle - first));
+            self.nodes.push(self.leaf(middle, first + count - middle));
+            self.nodes[index].first = child as u32;
+            self.nodes[index].count = 0;
+            open.push((child + 1, depth + 1));
+            open.push((child, depth + 1));
+        }
+    }
+
+    fn leaf(&self, first: usize, count: usize) -> Node {
+        let (low, high) = self.order[first..first + count].iter().fold(
+            (DVec3::INFINITY, DVec3::NEG_INFINITY),
+            |(low, high), &f| {
+                let (l, h) = self.boxes[f as usize];
+                (low.min(l), high.max(h))
+            },
+        );
+        Node { low, high, first: first as u32, count: count as u32 }
+    }
+
+    /// Where to split the faces `first .. first + count`, after reordering them; `None` for a leaf.
+    fn split(&mut self, first: usize, count: usize, depth: u32) -> Option<usize> {
+        if count <= LEAF {
+            return None;
+        }
+        let halves = Some(first + count / 2);
+        let center = |(low, high): (DVec3, DVec3)| low + high; // twice the centre is as good
+        let (low, high) = self.order[first..first + count].iter().fold(
+            (DVec3::INFINITY, DVec3::NEG_INFINITY),
+            |(low, high), &f| {
+                let c = center(self.boxes[f as usize]);
+                (low.min(c), high.max(c))
+            },
+        );
+        let extent = high - low;
+        let axis = extent.max_position();
+        if depth >= SAH_DEPTH || extent[axis] <= 0.0 {
+            return halves;
+        }
+        let scale = BINS as f64 / extent[axis];
+        let bin_of = |b: (DVec3, DVec3)| (((center(b)[axis] - low[axis]) * scale) as usize).min(BINS - 1);
+        let mut bins = [(DVec3::INFINITY, DVec3::NEG_INFINITY, 0usize); BINS];
+        for &f in &self.order[first..first + count] {
+            let (l, h) = self.boxes[f as usize];
+            let bin = &mut bins[bin_of((l, h))];
+            *bin = (bin.0.min(l), bin.1.max(h), bin.2 + 1);
+        }
+        let mut right_cost = [0.0; BINS];
+        let mut right = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0usize);
+        for k in (1..BINS).rev() {
+            right = (right.0.min(bins[k].0), right.1.max(bins[k].1), right.2 + bins[k].2);
+            right_cost[k] = half_area(right.0, right.1) * right.2 as f64;
+        }
+        let mut left = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0usize);
+        let mut best: Option<(f64, usize)> = None;
+        for k in 1..BINS {
+            left = (left.0.min(bins[k - 1].0), left.1.max(bins[k - 1].1), left.2 + bins[k - 1].2);
+            if left.2 == 0 || left.2 == count {
+                continue;
+            }
+            let cost = half_area(left.0, left.1) * left.2 as f64 + right_cost[k];
+            if best.is_none_or(|(least, _)| cost < least) {
+                best = Some((cost, k));
+            }
+        }
+        let Some((_, cut)) = best else { return halves };
+        // Stable partition: the order within each side, and so every answer, depends on the mesh alone.
+        let (mut lower, mut upper) = (Vec::with_capacity(count), Vec::with_capacity(count / 2));
+        for &f in &self.order[first..first + count] {
+            if bin_of(self.boxes[f as usize]) < cut { lower.push(f) } else { upper.push(f) }
+        }
+        let middle = first + lower.len();
+        self.order[first..middle].copy_from_slice(&lower);
+        self.order[middle..first + count].copy_from_slice(&upper);
+        Some(middle)
+    }
+}
+
+fn half_area(low: DVec3, high: DVec3) -> f64 {
+    let d = high - low;
+    if d.x < 0.0 { 0.0 } else { d.x * d.y + d.y * d.z + d.z * d.x }
+}

@@ -1,0 +1,13 @@
+//! Spatial queries on a triangle mesh: nearest point, ray, inside or outside, distance between two surfaces.
+//!
+//! Guarantees: answers are exact up to rounding (no approximate search), the same for any number of threads, and a
+//! query never allocates. Non-guarantees: a [`SurfaceIndex`] is a snapshot and does not follow a mesh that moves;
+//! [`SurfaceIndex::contains`] means something only for closed surfaces.
+
+mod bvh;
+mod deviation;
+mod triangle;
+
+pub use bvh::{NearestPoint, RayHit, SurfaceIndex};
+pub use deviation::{Deviation, deviation};
+pub use triangle::closest_point_on_triangle;
