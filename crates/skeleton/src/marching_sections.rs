@@ -35,6 +35,8 @@ use topipe_progress::Progress;
 
 /// A branch between two junctions with a shorter clean axis than this many radii is a part of one junction.
 const SHORTEST: f64 = 1.0;
+/// A branch with a longer clean axis than this many radii stands on its own, wherever the axes beside it meet.
+const LONGEST_INSIDE: f64 = 4.0;
 
 pub(crate) fn skeletonize(
     part: &Part,
@@ -153,7 +155,21 @@ fn superfluous(graph: &BranchGraph, axes: &[Option<Axis>]) -> Option<usize> {
         let tips = [first, last].iter().filter(|k| matches!(k, NodeKind::Tip(_))).count();
         let removable = branch.ends[0] != branch.ends[1] && (saddles == 2 || (saddles == 1 && tips == 1));
         let radius = axis.radius();
-        let length = if radius > 0.0 { axis.length() / radius } else { 0.0 };
+        let mut length = if radius > 0.0 { axis.length() / radius } else { 0.0 };
+        if saddles == 2 && radius > 0.0 && length < LONGEST_INSIDE {
+            // Four beams that cross give two saddles; the axes of the others tell whether they meet in one point.
+            let meet = |node: usize| {
+                let rays: Vec<_> = (graph.at(node).into_iter())
+                    .filter(|(other, _)| *other != b)
+                    .filter_map(|(other, end)| axes[other].as_ref()?.ray(end == 0))
+                    .collect();
+                let middle = mean(&rays.iter().map(|r| r.0).collect::<Vec<_>>())?;
+                (rays.len() > 1).then(|| junction::intersection(&rays, middle))
+            };
+            if let (Some(p), Some(q)) = (meet(branch.ends[0]), meet(branch.ends[1])) {
+                length = length.min(p.distance(q) / radius);
+            }
+        }
         if removable && length < SHORTEST && shortest.is_none_or(|(l, _)| length < l) {
             shortest = Some((length, b));
         }

@@ -11,8 +11,10 @@ const WORKING_SPACING: f64 = 0.35;
 const ROUNDS: usize = 5;
 /// The running median is over this many sections: fillets widen slowly over more, junctions suddenly over fewer.
 const MEDIAN_WINDOW: usize = 5;
-/// So many bad sections in a row are a flaw of the surface; more are a junction.
-const FLAW: usize = 2;
+/// So many bad sections in a row (four radii) are a knot or a flaw of the surface; more are a junction.
+const FLAW: usize = 12;
+/// A section with a smaller share of its branch has run into another one.
+pub(super) const OWN: f64 = 0.5;
 
 /// The clean sections of a branch in order, those of junctions, interfaces and tips left out.
 #[derive(Debug, Clone, Default)]
@@ -36,6 +38,7 @@ impl Axis {
         radii.sort_by(f64::total_cmp);
         let Some(&radius) = radii.get(radii.len() / 2) else { return Self::default() };
         let near = 2.5 * radius;
+        cutter.claim(&branch.vertices);
         let mut points = resample(&smooth(&line, 3), WORKING_SPACING * radius);
         let mut axis = Self::default();
         for round in 0..ROUNDS {
@@ -111,18 +114,20 @@ fn end_direction(points: &[DVec3], at_start: bool) -> DVec3 {
     (outer - inner).normalize_or_zero()
 }
 
-/// From the narrowest section in the middle outwards, as long as no section is more than `ratio` times the median of
-/// those before it, or leaps.
+/// From a narrow section in the middle outwards, as long as no section is more than `ratio` times wider than the
+/// median of those before it, or leaps.
 fn clean_range(loops: &[Option<Loop>], ratio: f64) -> Option<Vec<usize>> {
     let n = loops.len();
-    let usable = |k: usize| loops[k].as_ref().filter(|l| l.holds_centroid);
-    let narrowest = |from: usize, to: usize| {
-        (from..to)
-            .filter_map(|k| usable(k).map(|l| (l.area, k)))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|m| m.1)
+    let usable = |k: usize| loops[k].as_ref().filter(|l| l.holds_centroid && l.own >= OWN);
+    // The lower quartile by area: narrow, but not the one neck from which all else is wide.
+    let narrow = |from: usize, to: usize| {
+        let mut found: Vec<_> = (from..to).filter_map(|k| usable(k).map(|l| (l.area, k))).collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.get(found.len() / 4).map(|m| m.1)
     };
-    let start = narrowest(n / 5, n - n / 5).or_else(|| narrowest(0, n))?;
+    let start = narrow(n / 5, n - n / 5).or_else(|| narrow(0, n))?;
+    // The ratio is one of widths; areas go with its square.
+    let ratio = ratio * ratio;
     let walk = |indices: &mut dyn Iterator<Item = usize>| {
         let mut kept = vec![start];
         let mut bad = 0;
@@ -135,7 +140,7 @@ fn clean_range(loops: &[Option<Loop>], ratio: f64) -> Option<Vec<usize>> {
             let fine = usable(k).is_some_and(|l| {
                 let leap = previous.map_or(0.0, |p| p.distance(l.centroid));
                 l.area <= ratio * median
-                    && l.area * 2.0 * ratio >= median
+                    && l.area * 1.5 * ratio >= median
                     && leap < (0.8 + bad as f64 * WORKING_SPACING) * (median / std::f64::consts::PI).sqrt()
             });
             if fine {

@@ -91,9 +91,16 @@ impl BranchGraph {
     /// Removes a branch and joins what then is one branch at its ends.
     pub(super) fn remove(&mut self, b: usize) {
         if let Some(branch) = self.branches[b].take() {
-            branch.ends.iter().for_each(|&n| {
+            for n in branch.ends {
+                // A bump is part of the beam it stands on.
+                if let [(host, _), (other, _)] = self.at(n)[..]
+                    && host != other
+                    && let Some(host) = &mut self.branches[host]
+                {
+                    host.vertices.extend(&branch.vertices);
+                }
                 self.join(n);
-            });
+            }
         }
     }
 

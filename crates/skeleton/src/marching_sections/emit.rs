@@ -1,6 +1,6 @@
 //! From axes to the points and edges of the skeleton.
 
-use super::axis::{Axis, resample};
+use super::axis::{Axis, OWN, resample};
 use super::branches::{Branch, BranchGraph, NodeKind};
 use super::piece::Piece;
 use super::section::{Cutter, Loop};
@@ -12,6 +12,9 @@ use glam::DVec3;
 
 /// Rounds of the last centring. The third moves points of the fixtures by less than 1e-3 radii.
 const ROUNDS: usize = 4;
+
+/// No point nearer to a junction, interface or end than this many local radii.
+const CLEARANCE: f64 = 1.0;
 
 /// Where a node stands: its position, and its point in the skeleton (none for the seam of a ring).
 #[derive(Debug, Clone, Copy)]
@@ -75,9 +78,10 @@ pub(super) fn emit(
         let chain: Vec<u32> = first.point.into_iter().chain(ids.iter().copied()).chain(last.point).collect();
         chain.windows(2).for_each(|w| skeleton.add_edge(w[0], w[1]));
         if first.point.is_none()
-            && let (Some(&a), Some(&z)) = (ids.first(), ids.last()) {
-                skeleton.add_edge(a, z);
-            }
+            && let (Some(&a), Some(&z)) = (ids.first(), ids.last())
+        {
+            skeleton.add_edge(a, z);
+        }
     }
 }
 
@@ -133,16 +137,22 @@ fn centred(
         return without_axis(branch, least, inside);
     }
     let ring = ends[0].point.is_none();
-    let count = ((axis.length() / (parameters.spacing * radius)).round() as usize + 1).max(least).max(1);
-    let total = axis.sections.len();
+    let sections = if ring { &axis.sections[..] } else { between(&axis.sections, ends, least) };
+    let length: f64 = sections.windows(2).map(|w| w[0].centroid.distance(w[1].centroid)).sum();
+    let count = ((length / (parameters.spacing * radius)).round() as usize + 1).max(least).max(1);
+    let total = sections.len();
+    if total == 0 {
+        return Vec::new();
+    }
     let pick = |k: usize| if count == 1 { total / 2 } else { k * (total - 1) / (count - 1) };
     let mut picked: Vec<usize> = (0..count).map(pick).collect();
     picked.dedup();
     if picked.len() < least {
         return without_axis(branch, least, inside);
     }
-    let mut points: Vec<Loop> = picked.into_iter().map(|k| axis.sections[k].clone()).collect();
+    let mut points: Vec<Loop> = picked.into_iter().map(|k| sections[k].clone()).collect();
     let near = 2.5 * radius;
+    cutter.claim(&branch.vertices);
     for round in 0..ROUNDS {
         let n = points.len();
         let at = |points: &[Loop], k: isize| match (k, ring) {
@@ -161,7 +171,10 @@ fn centred(
             }
             let found = cutter.cut(points[k].centroid, tangent, &branch.vertices, near);
             if let Some(found) = found.filter(|l| {
-                l.holds_centroid && !l.cut_off && l.area <= parameters.junction_ratio * points[k].area
+                l.holds_centroid
+                    && !l.cut_off
+                    && l.own >= OWN
+                    && l.area <= parameters.junction_ratio.powi(2) * points[k].area
             }) {
                 good[k] = inside.contains(found.centroid);
                 next[k] = found;
@@ -192,6 +205,26 @@ fn centred(
             (within(l.centroid, inside), section)
         })
         .collect()
+}
+
+/// The sections that stand clear of both ends: next to a node its pull turns the tangent, and an axis that ran past
+/// its junction must not come back to it.
+fn between(sections: &[Loop], ends: [Place; 2], least: usize) -> &[Loop] {
+    let clear = |k: usize, inwards: usize, node: DVec3| {
+        let l = &sections[k];
+        let outwards = l.centroid - sections[inwards].centroid;
+        (node - l.centroid).dot(outwards.normalize_or_zero())
+            >= CLEARANCE * (l.area / std::f64::consts::PI).sqrt()
+    };
+    let (mut from, mut to) = (0, sections.len());
+    while to - from > least.max(1) && !clear(from, from + 1, ends[0].at) {
+        from += 1;
+    }
+    while to - from > least.max(1) && !clear(to - 1, to - 2, ends[1].at) {
+        to -= 1;
+    }
+    // What is left of a stub may be one section that is clear of neither end.
+    if to - from == 1 && least == 0 { &[] } else { &sections[from..to] }
 }
 
 /// Points for a branch that has no clean section: the level loops are all there is.

@@ -19,6 +19,8 @@ pub(super) struct Loop {
     pub(super) axis: DVec3,
     /// It runs over a closing fan: the section is cut off by an interface.
     pub(super) cut_off: bool,
+    /// Share of its crossings at edges of the branch it was cut for.
+    pub(super) own: f64,
     /// The point the plane was put through lies within.
     pub(super) holds_origin: bool,
     /// The centroid lies within.
@@ -31,12 +33,30 @@ pub(super) struct Cutter<'a> {
     /// The cut that last used a half-edge.
     used: Vec<u32>,
     cuts: u32,
+    /// The branch that last claimed a vertex, and how many have.
+    claimed: Vec<u32>,
+    claims: u32,
     points: Vec<DVec2>,
 }
 
 impl<'a> Cutter<'a> {
     pub(super) fn new(piece: &'a Piece) -> Self {
-        Self { piece, used: vec![0; piece.mesh.face_count() * 3], cuts: 0, points: Vec::new() }
+        Self {
+            piece,
+            used: vec![0; piece.mesh.face_count() * 3],
+            cuts: 0,
+            claimed: vec![0; piece.mesh.vertex_count()],
+            claims: 0,
+            points: Vec::new(),
+        }
+    }
+
+    /// Says whose sections the next cuts are for.
+    pub(super) fn claim(&mut self, vertices: &[VertexId]) {
+        self.claims += 1;
+        for v in vertices {
+            self.claimed[v.index()] = self.claims;
+        }
     }
 
     /// The loop of the plane through `origin` that belongs to a branch with the given vertices: the smallest that
@@ -86,7 +106,7 @@ impl<'a> Cutter<'a> {
         let (x, y) = normal.any_orthonormal_pair();
         let height = |v: VertexId| (piece.mesh.position(v) - origin).dot(normal);
         self.points.clear();
-        let mut cut_off = false;
+        let (mut cut_off, mut own) = (false, 0);
         let mut h = start;
         // Each step enters a face through an edge that rises or falls through the plane; exactly one of the other
         // two does as well.
@@ -98,6 +118,7 @@ impl<'a> Cutter<'a> {
             self.points.push(DVec2::new(p.dot(x), p.dot(y)));
             self.used[h.index()] = self.cuts;
             self.used[piece.connectivity.twin(h).index()] = self.cuts;
+            own += usize::from([a, b].iter().any(|v| self.claimed[v.index()] == self.claims));
             cut_off |= h.face().index() >= piece.own_faces;
             let next = h.next();
             let crossed = (height(piece.connectivity.origin(next)) > 0.0)
@@ -107,18 +128,12 @@ impl<'a> Cutter<'a> {
                 break;
             }
         }
-        measure(&self.points, origin, normal, x, y, cut_off)
+        let own = own as f64 / self.points.len() as f64;
+        measure(&self.points, origin, normal, x, y).map(|found| Loop { cut_off, own, ..found })
     }
 }
 
-fn measure(
-    points: &[DVec2],
-    origin: DVec3,
-    normal: DVec3,
-    x: DVec3,
-    y: DVec3,
-    cut_off: bool,
-) -> Option<Loop> {
+fn measure(points: &[DVec2], origin: DVec3, normal: DVec3, x: DVec3, y: DVec3) -> Option<Loop> {
     let n = points.len();
     let (mut area, mut first, mut xx, mut yy, mut xy, mut length) = (0.0, DVec2::ZERO, 0.0, 0.0, 0.0, 0.0);
     for k in 0..n {
@@ -152,7 +167,8 @@ fn measure(
         normal,
         moments: [mean + radius, (mean - radius).max(0.0)],
         axis: angle.cos() * x + angle.sin() * y,
-        cut_off,
+        cut_off: false,
+        own: 1.0,
         holds_origin: holds(points, DVec2::ZERO),
         holds_centroid: holds(points, center),
     })
@@ -178,7 +194,7 @@ mod tests {
     #[test]
     fn a_rectangle_has_its_textbook_moments() {
         let corners = [(1.0, 2.0), (5.0, 2.0), (5.0, 4.0), (1.0, 4.0)].map(|(x, y)| DVec2::new(x, y));
-        let found = measure(&corners, DVec3::ZERO, DVec3::Z, DVec3::X, DVec3::Y, false).unwrap();
+        let found = measure(&corners, DVec3::ZERO, DVec3::Z, DVec3::X, DVec3::Y).unwrap();
         assert!((found.area - 8.0).abs() < 1e-12);
         assert!(found.centroid.distance(DVec3::new(3.0, 3.0, 0.0)) < 1e-12);
         // b h^3 / 12: 2 * 4^3 / 12 about y, 4 * 2^3 / 12 about x.
