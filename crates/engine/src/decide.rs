@@ -38,7 +38,7 @@ pub enum Decision {
 /// Content hashes of the inputs of a stage; `None` where the result is not known yet.
 pub(crate) type InputHashes = BTreeMap<&'static str, Option<ContentHash>>;
 /// Ending and content hash of the files of a stage.
-pub(crate) type FileHashes = BTreeMap<&'static str, (String, ContentHash)>;
+pub(crate) type FileHashes = BTreeMap<String, (String, ContentHash)>;
 
 /// Everything a decision rests on but the results of the inputs.
 pub(crate) struct Decider<'a> {
@@ -152,21 +152,21 @@ impl<'a> Decider<'a> {
             kind: node.stage.kind().to_owned(),
             code_version: self.code_versions[stage].clone(),
             key,
-            parameters: node.parameters.json.clone(),
+            parameters: node.parameters.essence.clone(),
             inputs: inputs.iter().map(|(port, hash)| ((*port).to_owned(), *hash)).collect(),
-            files: self.files[stage].iter().map(|(field, (_, hash))| ((*field).to_owned(), *hash)).collect(),
+            files: self.files[stage].iter().map(|(field, (_, hash))| (field.clone(), *hash)).collect(),
         }
     }
 }
 
 fn hash_files(node: &StageNode, cache: &Cache) -> Result<FileHashes, EngineError> {
     let mut hashes = FileHashes::new();
-    for (&field, file) in &node.files {
+    for (field, file) in &node.files {
         let hash = input_file::hash_input(&file.path, cache)
             .map_err(|error| EngineError::InputFile(Box::new(file.place.diagnostic(error.to_string()))))?;
         let ending =
             file.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-        hashes.insert(field, (ending, hash));
+        hashes.insert(field.clone(), (ending, hash));
     }
     Ok(hashes)
 }

@@ -98,7 +98,7 @@ pub fn with_causes(error: &dyn std::error::Error) -> String {
 /// What a running stage is given besides its parameters.
 pub struct StageContext<'a> {
     pub(crate) inputs: BTreeMap<&'static str, Value>,
-    pub(crate) files: BTreeMap<&'static str, SourceFile>,
+    pub(crate) files: BTreeMap<String, SourceFile>,
     pub(crate) progress: &'a Progress,
 }
 
@@ -122,7 +122,7 @@ impl StageContext<'_> {
         }
     }
 
-    /// The file named in a field.
+    /// The file named in a field: by the name of the field, or by one of the pointers of [`Stage::nested_files`].
     pub fn file(&self, field: &str) -> Option<&SourceFile> {
         self.files.get(field)
     }
@@ -152,6 +152,12 @@ pub trait Stage: Send + Sync + 'static {
     fn files(&self) -> Vec<FileField> {
         Vec::new()
     }
+    /// Where `parameters`, written as JSON, name further files: JSON pointers to strings. These files are read and
+    /// hashed like those of [`Self::files`]; what they are called has no part in the key.
+    fn nested_files(&self, parameters: &Self::Parameters) -> Vec<String> {
+        let _ = parameters;
+        Vec::new()
+    }
     /// Computes the result. Must depend on nothing but its arguments.
     fn run(
         &self,
@@ -163,15 +169,19 @@ pub trait Stage: Send + Sync + 'static {
 /// Parameters of a stage with all defaults filled in.
 #[derive(Clone)]
 pub struct ResolvedParameters {
-    /// As JSON, for keys, reasons and records.
+    /// As JSON, for records.
     pub json: serde_json::Value,
+    /// As JSON without the names of files, for keys and reasons.
+    pub(crate) essence: serde_json::Value,
+    /// JSON pointers to the names of files.
+    pub(crate) nested_files: Vec<String>,
     typed: Arc<dyn Any + Send + Sync>,
 }
 
 impl ResolvedParameters {
     /// The same parameters always give the same text: fields sorted by name, numbers in their shortest form.
     pub(crate) fn canonical(&self) -> String {
-        canonical_json(&self.json)
+        canonical_json(&self.essence)
     }
 }
 
@@ -259,7 +269,14 @@ impl<S: Stage> AnyStage for Erased<S> {
     fn parse(&self, table: toml::de::Deserializer<'_>) -> Result<ResolvedParameters, toml::de::Error> {
         let typed = <S::Parameters as serde::Deserialize>::deserialize(table)?;
         let json = serde_json::to_value(&typed).map_err(serde::de::Error::custom)?;
-        Ok(ResolvedParameters { json, typed: Arc::new(typed) })
+        let nested_files = self.0.nested_files(&typed);
+        let mut essence = json.clone();
+        for pointer in &nested_files {
+            if let Some(name) = essence.pointer_mut(pointer) {
+                *name = serde_json::Value::Null;
+            }
+        }
+        Ok(ResolvedParameters { json, essence, nested_files, typed: Arc::new(typed) })
     }
 
     fn run(&self, context: &StageContext<'_>, parameters: &ResolvedParameters) -> Result<Value, StageError> {
@@ -280,7 +297,7 @@ pub(crate) struct KeyParts<'a> {
     /// Port name and content hash, for the ports that are connected.
     pub(crate) inputs: &'a BTreeMap<&'static str, ContentHash>,
     /// Field name, ending of the file's name (it selects the parser) and content hash.
-    pub(crate) files: &'a BTreeMap<&'static str, (String, ContentHash)>,
+    pub(crate) files: &'a BTreeMap<String, (String, ContentHash)>,
 }
 
 impl KeyParts<'_> {

@@ -378,14 +378,14 @@ impl<'a> Executor<'a> {
         Ok(Settled::Produced(Produced { value, record }))
     }
 
-    fn read_files(&self, stage: usize) -> Result<BTreeMap<&'static str, SourceFile>, Failure> {
+    fn read_files(&self, stage: usize) -> Result<BTreeMap<String, SourceFile>, Failure> {
         let node = self.node(stage);
         let mut files = BTreeMap::new();
-        for (&field, (_, hash)) in self.decider.files(stage) {
+        for (field, (_, hash)) in self.decider.files(stage) {
             let path = &node.files[field].path;
             let bytes = input_file::read_input(path, *hash)?.into();
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-            files.insert(field, SourceFile { name, bytes });
+            files.insert(field.clone(), SourceFile { name, bytes });
         }
         Ok(files)
     }
@@ -477,8 +477,8 @@ impl<'a> Executor<'a> {
             .decider
             .files(stage)
             .iter()
-            .map(|(&field, (_, hash))| {
-                (field, FileRecord { path: node.files[field].path.clone(), hash: *hash })
+            .map(|(field, (_, hash))| {
+                (field.clone(), FileRecord { path: node.files[field].path.clone(), hash: *hash })
             })
             .collect();
         let slot = std::mem::take(&mut *lock(&self.slots[stage]));

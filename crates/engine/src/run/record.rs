@@ -107,7 +107,7 @@ pub struct StageRecord {
     /// Its inputs.
     pub inputs: BTreeMap<&'static str, InputRecord>,
     /// Its files.
-    pub files: BTreeMap<&'static str, FileRecord>,
+    pub files: BTreeMap<String, FileRecord>,
     /// Its key.
     pub key: Option<ContentHash>,
     /// Its artifact.

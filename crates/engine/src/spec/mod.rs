@@ -54,8 +54,8 @@ pub struct StageNode {
     pub stage: Arc<dyn AnyStage>,
     /// Port name and the index of the stage connected to it.
     pub inputs: BTreeMap<&'static str, usize>,
-    /// Field name and the file named there.
-    pub files: BTreeMap<&'static str, FileInput>,
+    /// Field name, or JSON pointer into the parameters, and the file named there.
+    pub files: BTreeMap<String, FileInput>,
     /// All its parameters.
     pub parameters: ResolvedParameters,
     /// Where the spec begins it.

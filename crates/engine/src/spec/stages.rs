@@ -112,7 +112,7 @@ fn one(
             Role::File(field, text) => {
                 let directory = path.parent().unwrap_or(Path::new(""));
                 let place = Place { source: Arc::clone(source), span: value.span() };
-                files.insert(field, FileInput { path: directory.join(text), place });
+                files.insert(field.to_owned(), FileInput { path: directory.join(text), place });
             }
             Role::Parameter => {
                 rest.insert(Spanned::new(key.span(), key.get_ref().clone()), value.clone());
@@ -133,7 +133,7 @@ fn one(
                 }
                 // A path on the command line is relative to where the command is given.
                 Role::File(field, text) => {
-                    files.insert(field, FileInput { path: text.into(), place });
+                    files.insert(field.to_owned(), FileInput { path: text.into(), place });
                 }
                 Role::Parameter => parameter_overrides.push((*over, entries.clone())),
             }
@@ -141,7 +141,21 @@ fn one(
     }
     require(&section, &wanted, &files)?;
     let given = Given { spec: (source, rest), overrides: parameter_overrides };
+    let set_here: Vec<String> = given
+        .overrides
+        .iter()
+        .flat_map(|(_, entries)| entries.keys().map(|key| key.get_ref().clone().into_owned()))
+        .collect();
     let parameters = parameters::resolve(stage.as_ref(), name, given)?;
+    for pointer in &parameters.nested_files {
+        let Some(text) = parameters.json.pointer(pointer).and_then(serde_json::Value::as_str) else {
+            continue;
+        };
+        let field = pointer.split('/').nth(1).unwrap_or_default();
+        let on_command_line = set_here.iter().any(|set| set == field);
+        let base = if on_command_line { Path::new("") } else { path.parent().unwrap_or(Path::new("")) };
+        files.insert(pointer.clone(), FileInput { path: base.join(text), place: section.place.clone() });
+    }
     let node = StageNode {
         name: name.to_owned(),
         stage: Arc::clone(stage),
@@ -211,11 +225,7 @@ fn accept(
 }
 
 /// Every input and file that must be given is given.
-fn require(
-    section: &Section<'_, '_>,
-    wanted: &Wanted,
-    files: &BTreeMap<&'static str, FileInput>,
-) -> Checked<()> {
+fn require(section: &Section<'_, '_>, wanted: &Wanted, files: &BTreeMap<String, FileInput>) -> Checked<()> {
     let missing = |field: &str, doc: &str, help: String| {
         let doc = doc.trim_end_matches('.');
         let message = format!("stage `{}` ({}) needs `{field}`: {doc}", section.name, section.stage.kind());

@@ -1,0 +1,74 @@
+//! The output folder.
+
+use crate::toy::{CHAIN, Workshop};
+
+#[test]
+fn a_deleted_or_edited_export_is_restored() {
+    let shop = Workshop::new(CHAIN);
+    shop.run();
+    std::fs::remove_file(shop.options.out.join("loud.txt")).unwrap();
+    assert_eq!(shop.log()[4..], ["loud.txt written", "size.json up to date"]);
+    assert_eq!(shop.out("loud.txt"), "hello.!");
+
+    std::fs::write(shop.options.out.join("size.json"), "8").unwrap();
+    assert_eq!(shop.log()[4..], ["loud.txt up to date", "size.json written"]);
+    assert_eq!(shop.out("size.json"), "7");
+}
+
+#[test]
+fn an_export_into_another_folder_needs_no_stage() {
+    let mut shop = Workshop::new(CHAIN);
+    shop.run();
+    shop.options.out = shop.path("second");
+    let log = shop.log();
+    assert_eq!(log[..4], ["read cached", "soft cached", "loud cached", "size cached"]);
+    assert_eq!(log[4..], ["loud.txt written", "size.json written"]);
+}
+
+#[test]
+fn the_ending_picks_the_writer_and_folders_are_made() {
+    let shop = Workshop::new(CHAIN);
+    shop.edit("\"loud.txt\" = \"loud\"", "\"a/b/Title.MD\" = \"loud\"");
+    shop.run();
+    assert_eq!(shop.out("a/b/Title.MD"), "# Title\nhello.!");
+}
+
+#[test]
+fn a_damaged_artifact_is_made_again_for_its_export() {
+    let shop = Workshop::new(CHAIN);
+    let (record, _) = shop.run();
+    let path = shop.cache().path(topipe_engine::cache::Bucket::Artifacts, record.stages[2].artifact.unwrap());
+    let mut bytes = std::fs::read(&path).unwrap();
+    *bytes.last_mut().unwrap() ^= 4;
+    std::fs::write(&path, bytes).unwrap();
+    std::fs::remove_file(shop.options.out.join("loud.txt")).unwrap();
+    let log = shop.log();
+    assert_eq!(log[4], "quarantined from artifacts-v1: the payload does not match its hash");
+    assert_eq!(log[5], "loud starts: its result in the cache is damaged");
+    assert_eq!(log[8..], ["loud.txt written", "size.json up to date"]);
+    assert_eq!(shop.out("loud.txt"), "hello.!");
+}
+
+#[test]
+fn an_export_that_cannot_be_written_fails_and_the_others_are_written() {
+    let shop = Workshop::new(CHAIN);
+    std::fs::create_dir_all(shop.options.out.join("loud.txt")).unwrap();
+    let (record, log) = shop.run();
+    assert_eq!(record.exit_code, 4);
+    assert!(log.iter().any(|line| line.starts_with("loud.txt failed (4): cannot write ")), "{log:#?}");
+    assert!(log.contains(&"size.json written".to_owned()));
+}
+
+#[test]
+fn nothing_temporary_is_left() {
+    let shop = Workshop::new(CHAIN);
+    shop.run();
+    let mut files: Vec<String> = std::fs::read_dir(&shop.options.out)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    files.sort();
+    assert_eq!(files, ["loud.txt", "run.json", "size.json"]);
+    let locks = shop.cache().files(topipe_engine::cache::Bucket::Locks).unwrap();
+    assert!(locks.is_empty(), "{locks:?}");
+}

@@ -1,0 +1,12 @@
+//! The engine as its users see it, with stages that handle text instead of meshes.
+
+mod cache_damage;
+mod caching;
+mod concurrency;
+mod exports;
+mod failures;
+mod keys;
+mod schema;
+mod selection;
+mod spec_errors;
+mod toy;
