@@ -31,7 +31,7 @@ struct Candidate {
     edge: f64,
 }
 
-/// All holes, largest first, with the faces of their walls.
+/// All holes, those with most faces first, with the faces of their walls; area and residual are left to measure.
 pub(super) fn holes(
     mesh: &TriangleMesh,
     connectivity: &Connectivity,
@@ -71,21 +71,18 @@ pub(super) fn holes(
         }
         found.push((region(mesh, cylinder, &faces), faces));
     }
-    found.sort_by(|a, b| b.0.area.total_cmp(&a.0.area).then(a.1[0].cmp(&b.1[0])));
+    // By number of faces: unlike areas, counts are the same after a rotation.
+    found.sort_by(|a, b| b.1.len().cmp(&a.1.len()).then(a.1[0].cmp(&b.1[0])));
     Ok(found)
 }
 
 fn region(mesh: &TriangleMesh, cylinder: Cylinder, faces: &[FaceId]) -> Region {
     let mut area = 0.0;
     let mut centroid = DVec3::ZERO;
-    let mut residual: f64 = 0.0;
     for &f in faces {
-        let a = mesh.area_vector(f).length() / 2.0;
+        let a = mesh.area_vector(f).length();
         area += a;
         centroid += a * mesh.centroid(f);
-        for p in mesh.corners(f) {
-            residual = residual.max(cylinder.distance(p).abs());
-        }
     }
     centroid /= area;
     let point = centroid - cylinder.radial(centroid);
@@ -95,7 +92,7 @@ fn region(mesh: &TriangleMesh, cylinder: Cylinder, faces: &[FaceId]) -> Region {
         axis.to_array().into_iter().fold(0.0, |a: f64, b| if b.abs() > a.abs() + 1e-9 { b } else { a });
     let axis = if lead < 0.0 { -axis } else { axis };
     let shape = RegionShape::Cylinder { point, axis, radius: cylinder.radius, hole: true };
-    Region { shape, area, residual }
+    Region { shape, area: 0.0, residual: 0.0 }
 }
 
 /// Fits a cylinder to the patch around `seed`, if it lies in a hollow.

@@ -26,7 +26,7 @@ pub use edges::feature_edges;
 /// What was found on a part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Features {
-    /// The regions: those the part came with, then holes, then planes, larger ones first.
+    /// The regions: those the part came with, then holes, then planes, those with more faces first.
     pub regions: Vec<Region>,
     /// The region of each face, or [`RegionId::NONE`].
     pub region_of_face: Vec<RegionId>,
@@ -92,7 +92,9 @@ pub fn detect(
         }
     }
     let outline = outline(part, connectivity, parameters, &regions, &region_of_face);
-    Ok(Features { regions, region_of_face, on_region, outline })
+    let mut features = Features { regions, region_of_face, on_region, outline };
+    features.measure(mesh);
+    Ok(features)
 }
 
 fn add(regions: &mut Vec<Region>, region_of_face: &mut [RegionId], region: Region, faces: &[FaceId]) {

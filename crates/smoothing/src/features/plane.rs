@@ -1,5 +1,6 @@
 //! Flat faces by region growing.
 
+use super::border_half_edges;
 use super::fit::Symmetric;
 use crate::Parameters;
 use topipe_mesh::{Connectivity, DVec3, FaceId, Region, RegionShape, TriangleMesh};
@@ -11,6 +12,13 @@ const LARGE_SHARE: f64 = 0.05;
 
 /// Facets with less than this many squared mean edge lengths of area have normals that say nothing.
 const SLIVER: f64 = 0.01;
+
+/// A patch is a terrace of a voxel mesh when more than this share of its border leads over a step of at most
+/// `HIGHEST_STEP` mean edge lengths to a parallel facet.
+const TERRACE_SHARE: f64 = 0.5;
+
+/// One voxel is 0.88 mean edge lengths high when its faces are cut into two triangles each.
+const HIGHEST_STEP: f64 = 1.5;
 
 struct Plane {
     point: DVec3,
@@ -31,7 +39,7 @@ struct Search<'a> {
     round: u32,
 }
 
-/// All flat faces, largest first, with their faces.
+/// All flat faces, those with most facets first, with their facets; area and residual are left to measure.
 pub(super) fn planes(
     mesh: &TriangleMesh,
     connectivity: &Connectivity,
@@ -70,24 +78,33 @@ pub(super) fn planes(
         let core = search.open(&faces);
         let (whole_area, core_area) = (search.area(&faces), search.area(&core));
         // Opening removes teeth from a large face; a coarse face would lose itself.
-        let faces = if core_area >= 0.7 * whole_area { core } else { faces };
-        if core_area < least && whole_area < large {
+        let kept = if core_area >= 0.7 * whole_area { core } else { faces.clone() };
+        if (core_area < least && whole_area < large) || search.is_terrace(&plane, &kept) {
             continue;
         }
-        for f in &faces {
+        for f in &kept {
             search.taken[f.index()] = true;
         }
-        let residual = faces
-            .iter()
-            .flat_map(|&f| mesh.corners(f))
-            .map(|p| plane.normal.dot(p - plane.point).abs())
-            .fold(0.0, f64::max);
-        let area = search.area(&faces);
-        let shape = RegionShape::Plane { point: plane.point, normal: plane.normal };
-        found.push((Region { shape, area, residual }, faces));
+        let dropped = faces.into_iter().filter(|f| !search.taken[f.index()]).collect();
+        found.push(Found { plane, faces: kept, dropped });
     }
-    found.sort_by(|a, b| b.0.area.total_cmp(&a.0.area).then(a.1[0].cmp(&b.1[0])));
-    Ok(found)
+    search.return_corners(&mut found);
+    // By number of faces: unlike areas, counts are the same after a rotation.
+    found.sort_by(|a, b| b.faces.len().cmp(&a.faces.len()).then(a.faces[0].cmp(&b.faces[0])));
+    Ok(found
+        .into_iter()
+        .map(|Found { plane, faces, .. }| {
+            let shape = RegionShape::Plane { point: plane.point, normal: plane.normal };
+            (Region { shape, area: 0.0, residual: 0.0 }, faces)
+        })
+        .collect())
+}
+
+/// A flat face, with the teeth that opening took from it.
+struct Found {
+    plane: Plane,
+    faces: Vec<FaceId>,
+    dropped: Vec<FaceId>,
 }
 
 impl Search<'_> {
@@ -200,6 +217,70 @@ impl Search<'_> {
         }
         let normal = moments.eigen().1[0];
         Some(Plane { point, normal: if normal.dot(direction) < 0.0 { -normal } else { normal } })
+    }
+
+    /// Gives facets back that opening took although they are no teeth: at the corner of a block one facet may have
+    /// all its vertices on edges. All faces around such a vertex are flat, those around the tip of a tooth are not.
+    fn return_corners(&mut self, found: &mut [Found]) {
+        let mut flat = self.taken.clone();
+        for f in found.iter().flat_map(|p| &p.dropped) {
+            flat[f.index()] = true;
+        }
+        for region in found {
+            self.round += 1;
+            for f in &region.faces {
+                self.visited[f.index()] = self.round;
+            }
+            let (connectivity, visited, round) = (self.connectivity, &self.visited, self.round);
+            let returned: Vec<FaceId> = region
+                .dropped
+                .iter()
+                .copied()
+                .filter(|&f| {
+                    self.mesh.triangles[f.index()].iter().all(|&v| {
+                        connectivity.outgoing(v).any(|h| visited[h.face().index()] == round)
+                            || connectivity.outgoing(v).all(|h| flat[h.face().index()])
+                    })
+                })
+                .collect();
+            for f in &returned {
+                self.taken[f.index()] = true;
+            }
+            region.faces.extend(returned);
+            region.faces.sort_unstable();
+        }
+    }
+
+    /// True when most of the border is the edge of a step, as around each layer of a voxel mesh. Its own flat faces
+    /// can not be told from its steps by their size: the cap of a ball of 16 voxels has 50 of them.
+    fn is_terrace(&self, plane: &Plane, faces: &[FaceId]) -> bool {
+        let (mut border, mut steps) = (0.0, 0.0);
+        for h in border_half_edges(self.connectivity, faces, |f| faces.binary_search(&f).is_ok()) {
+            let (a, b) = (self.mesh.origin(h), self.mesh.target(h));
+            let length = self.mesh.position(a).distance(self.mesh.position(b));
+            border += length;
+            let twin = self.connectivity.twin(h);
+            if twin.is_some() && self.leads_over_step(plane, twin.face()) {
+                steps += length;
+            }
+        }
+        steps > TERRACE_SHARE * border
+    }
+
+    /// True when `riser` is at a right angle to the plane and a facet next to it, or next to a neighbour of it, is
+    /// parallel to the plane one step away.
+    fn leads_over_step(&self, plane: &Plane, riser: FaceId) -> bool {
+        let upright =
+            |f: FaceId| self.area_vectors[f.index()].normalize_or_zero().dot(plane.normal).abs() < 0.1;
+        let tread = |f: FaceId| {
+            let offsets = self.mesh.corners(f).map(|p| plane.normal.dot(p - plane.point).abs());
+            let low = offsets.iter().fold(f64::INFINITY, |a, &b| a.min(b));
+            let high = offsets.iter().fold(0.0, |a: f64, &b| a.max(b));
+            low > 10.0 * self.tolerance && high - low <= self.tolerance && high <= HIGHEST_STEP * self.edge
+        };
+        let around =
+            |f: FaceId| (0..3).map(move |k| self.connectivity.neighbor(f, k)).filter(|g| g.is_some());
+        upright(riser) && around(riser).any(|f| tread(f) || (upright(f) && around(f).any(tread)))
     }
 
     /// Faces with a vertex whose whole ring is in `faces` (a morphological opening): drops teeth and strips of one

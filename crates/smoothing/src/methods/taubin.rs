@@ -1,7 +1,7 @@
 //! Taubin's low-pass filter: a Laplacian step of `lambda`, then one of `mu < -lambda` that inflates.
 //!
 //! Taubin, "A signal processing approach to fair surface design", 1995. Wave numbers below the pass band
-//! `1/lambda + 1/mu` are kept; the rule 0.01 < 1/lambda + 1/mu < 0.1 holds for lambda = 0.6307, mu = -0.6732. The
+//! `1/lambda + 1/mu` are kept; the rule 0.01 < 1/lambda + 1/mu < 0.1 holds, up to rounding, for lambda = 0.6307, mu = -0.6732. The
 //! -0.53 of the comparison in Bacciaglia et al. 2021 has a negative pass band: it is a slow Laplacian and shrinks
 //! (-23 % after 68 iterations on a noisy beam).
 

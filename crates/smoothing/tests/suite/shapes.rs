@@ -1,0 +1,78 @@
+//! Meshes with known answers.
+
+use crate::Noise;
+use std::collections::HashMap;
+use topipe_mesh::{DVec3, TriangleMesh};
+
+/// A sphere of radius 10 about `center`: an octahedron refined `levels` times.
+pub(crate) fn sphere(levels: usize, center: DVec3) -> TriangleMesh {
+    let mut points = vec![DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z];
+    let mut triangles: Vec<[u32; 3]> =
+        vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    for _ in 0..levels {
+        let mut middles = HashMap::new();
+        let mut finer = Vec::with_capacity(4 * triangles.len());
+        for t in triangles {
+            let m = [0, 1, 2].map(|k| {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                    points.push((points[a as usize] + points[b as usize]).normalize());
+                    points.len() as u32 - 1
+                })
+            });
+            finer.extend([[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], m]);
+        }
+        triangles = finer;
+    }
+    TriangleMesh::from_arrays(points.iter().map(|p| (center + 10.0 * *p).to_array()).collect(), triangles)
+}
+
+/// Moves each vertex by up to `size` along each axis.
+pub(crate) fn shake(mesh: &mut TriangleMesh, size: f64, seed: u64) {
+    let mut noise = Noise(seed);
+    for p in &mut mesh.positions {
+        *p += size * DVec3::new(noise.next(), noise.next(), noise.next());
+    }
+}
+
+/// The surface of the unit voxels whose centres satisfy `inside`, two triangles per voxel face.
+pub(crate) fn voxels(size: i32, inside: impl Fn(DVec3) -> bool) -> TriangleMesh {
+    let filled = |c: [i32; 3]| inside(DVec3::new(c[0].into(), c[1].into(), c[2].into()) + 0.5);
+    let mut vertices = HashMap::new();
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for x in -size..size {
+        for y in -size..size {
+            for z in -size..size {
+                if !filled([x, y, z]) {
+                    continue;
+                }
+                for axis in 0..3 {
+                    for side in 0..2 {
+                        let mut beyond = [x, y, z];
+                        beyond[axis] += 2 * side - 1;
+                        if filled(beyond) {
+                            continue;
+                        }
+                        let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[u, v]| {
+                            let mut c = [x, y, z];
+                            c[axis] += side;
+                            c[(axis + 1) % 3] += u;
+                            c[(axis + 2) % 3] += v;
+                            *vertices.entry(c).or_insert_with(|| {
+                                positions.push(c.map(f64::from));
+                                positions.len() as u32 - 1
+                            })
+                        });
+                        let [a, b, c, d] = corners;
+                        if side == 1 {
+                            triangles.extend([[a, b, c], [a, c, d]]);
+                        } else {
+                            triangles.extend([[a, c, b], [a, d, c]]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    TriangleMesh::from_arrays(positions, triangles)
+}
