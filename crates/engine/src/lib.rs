@@ -109,6 +109,6 @@ pub use schema::{ParameterField, parameter_fields, pipeline_schema};
 pub use selection::Choice;
 pub use spec::{ExportNode, FileInput, Override, OverrideError, Pipeline, Place, SpecError, StageNode};
 pub use stage::{
-    AnyStage, FileField, InputPort, ResolvedParameters, SourceFile, Stage, StageContext, StageError,
-    with_causes,
+    AnyStage, BadValue, FileField, InputPort, ResolvedParameters, SourceFile, Stage, StageContext,
+    StageError, with_causes,
 };

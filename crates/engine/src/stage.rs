@@ -75,6 +75,15 @@ pub enum StageError {
     Interrupted,
 }
 
+/// A parameter has a value of the right type that makes no sense.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BadValue {
+    /// The field, so that the message can point at it.
+    pub field: String,
+    /// What is wrong.
+    pub message: String,
+}
+
 impl From<topipe_progress::Interrupted> for StageError {
     fn from(_: topipe_progress::Interrupted) -> Self {
         Self::Interrupted
@@ -158,6 +167,11 @@ pub trait Stage: Send + Sync + 'static {
         let _ = parameters;
         Vec::new()
     }
+    /// Checks what can be checked of the parameters without the inputs, before anything runs.
+    fn check(&self, parameters: &Self::Parameters) -> Result<(), BadValue> {
+        let _ = parameters;
+        Ok(())
+    }
     /// Computes the result. Must depend on nothing but its arguments.
     fn run(
         &self,
@@ -225,6 +239,8 @@ pub trait AnyStage: Send + Sync {
     fn default_parameters(&self) -> serde_json::Value;
     /// Checks and completes a table of parameters.
     fn parse(&self, table: toml::de::Deserializer<'_>) -> Result<ResolvedParameters, toml::de::Error>;
+    /// Checks the values of parameters.
+    fn check(&self, parameters: &ResolvedParameters) -> Result<(), BadValue>;
     /// Runs the stage.
     fn run(&self, context: &StageContext<'_>, parameters: &ResolvedParameters) -> Result<Value, StageError>;
 }
@@ -277,6 +293,11 @@ impl<S: Stage> AnyStage for Erased<S> {
             }
         }
         Ok(ResolvedParameters { json, essence, nested_files, typed: Arc::new(typed) })
+    }
+
+    fn check(&self, parameters: &ResolvedParameters) -> Result<(), BadValue> {
+        // Parameters of another kind are refused by `run`.
+        parameters.typed.downcast_ref::<S::Parameters>().map_or(Ok(()), |typed| self.0.check(typed))
     }
 
     fn run(&self, context: &StageContext<'_>, parameters: &ResolvedParameters) -> Result<Value, StageError> {

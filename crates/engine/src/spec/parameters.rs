@@ -1,7 +1,7 @@
 //! The parameters of one stage.
 
-use super::Checked;
 use super::overrides::{self, Sourced};
+use super::{Checked, Place};
 use crate::diagnostic::{Diagnostic, Source};
 use crate::schema;
 use crate::stage::{AnyStage, ResolvedParameters};
@@ -16,18 +16,30 @@ pub(super) struct Given<'t, 's> {
 }
 
 /// Checks each text by itself, so that a message points into the right one, and then puts them together.
-pub(super) fn resolve(stage: &dyn AnyStage, name: &str, given: Given<'_, '_>) -> Checked<ResolvedParameters> {
+pub(super) fn resolve(
+    stage: &dyn AnyStage,
+    name: &str,
+    header: &Place,
+    given: Given<'_, '_>,
+) -> Checked<ResolvedParameters> {
     let (source, mut table) = given.spec;
+    let spec = table.clone();
     let mut resolved = parse(stage, name, source, &table)?;
-    if given.overrides.is_empty() {
-        return Ok(resolved);
-    }
     for (over, entries) in &given.overrides {
         parse(stage, name, &over.source, entries)?;
         overrides::merge(&mut table, entries);
         // Alone each was right; together they may still not be, as with the variants of an enum.
         resolved = parse(stage, name, &over.source, &table)?;
     }
+    stage.check(&resolved).map_err(|bad| {
+        let texts = given.overrides.iter().rev().map(|(over, entries)| (&over.source, entries));
+        let place = texts.chain([(source, &spec)]).find_map(|(source, entries)| {
+            let value = entries.get(bad.field.as_str())?;
+            Some(Place { source: Arc::clone(source), span: value.span() })
+        });
+        let message = format!("{} in stage `{name}` ({})", bad.message, stage.kind());
+        Box::new(place.as_ref().unwrap_or(header).diagnostic(message))
+    })?;
     Ok(resolved)
 }
 

@@ -146,7 +146,7 @@ fn one(
         .iter()
         .flat_map(|(_, entries)| entries.keys().map(|key| key.get_ref().clone().into_owned()))
         .collect();
-    let parameters = parameters::resolve(stage.as_ref(), name, given)?;
+    let parameters = parameters::resolve(stage.as_ref(), name, &section.place, given)?;
     for pointer in &parameters.nested_files {
         let Some(text) = parameters.json.pointer(pointer).and_then(serde_json::Value::as_str) else {
             continue;

@@ -149,6 +149,16 @@ fn value_out_of_the_type() {
 }
 
 #[test]
+fn value_out_of_its_range() {
+    assert_eq!(
+        error("times = 2", "times = 200"),
+        "error: `times` is 200, at most 100 is allowed in stage `loud` (append)\n --> p.toml:8:9\n  |\n8 | times = 200\n  \
+         |         ^^^"
+    );
+    assert!(check(GOOD, &["loud.times=300"]).contains("command line:1:18"));
+}
+
+#[test]
 fn unknown_choice() {
     assert_eq!(
         error("times = 2", "style = \"uper\""),

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use topipe_engine::{
-    ArtifactKind, Cache, Choice, Event, ExitCode, Exporter, FileField, InputPort, Interrupt, Override,
-    Pipeline, Plan, Registry, RunOptions, RunRecord, Stage, StageContext, StageError, plan, run,
+    ArtifactKind, BadValue, Cache, Choice, Event, ExitCode, Exporter, FileField, InputPort, Interrupt,
+    Override, Pipeline, Plan, Registry, RunOptions, RunRecord, Stage, StageContext, StageError, plan, run,
 };
 
 pub(crate) struct Text;
@@ -107,6 +107,15 @@ impl Stage for Append {
     }
     fn inputs(&self) -> Vec<InputPort> {
         vec![InputPort::required::<Text>("input", "The text.")]
+    }
+    fn check(&self, parameters: &AppendParameters) -> Result<(), BadValue> {
+        if parameters.times <= 100 {
+            return Ok(());
+        }
+        Err(BadValue {
+            field: "times".into(),
+            message: format!("`times` is {}, at most 100 is allowed", parameters.times),
+        })
     }
     fn run(&self, context: &StageContext<'_>, parameters: &AppendParameters) -> Result<String, StageError> {
         context.progress().remark("appending");
