@@ -122,6 +122,37 @@ impl Sets {
         interfaces
     }
 
+    /// The design sets with interfaces that enclose no volume once these are closed, ascending.
+    pub(crate) fn hollow(&self, mesh: &TriangleMesh) -> Vec<u32> {
+        let n = self.label.len();
+        let (mut volume, mut area, mut about) = (vec![0.0; n], vec![0.0; n], vec![None; n]);
+        let mut add = |set: usize, corners: [DVec3; 3]| {
+            let origin = *about[set].get_or_insert(corners[0]);
+            let [a, b, c] = corners.map(|p| p - origin);
+            volume[set] += a.dot(b.cross(c)) / 6.0;
+            area[set] += (b - a).cross(c - a).length() / 2.0;
+        };
+        for face in mesh.faces() {
+            add(self.of_face[face.index()] as usize, mesh.corners(face));
+        }
+        let mut bordered = vec![false; n];
+        for interface in &self.interfaces {
+            let set = self.of_face[interface.half_edges[0].face().index()] as usize;
+            bordered[set] = true;
+            let count = interface.vertices.len();
+            for k in 0..count {
+                let (a, b) = (interface.vertices[k], interface.vertices[(k + 1) % count]);
+                add(set, [mesh.position(b), mesh.position(a), interface.node_mean]);
+            }
+        }
+        // A round bar a thousand radii long has 6e-3, a plate 300 times as wide as thick 1e-3.
+        let hollow = |s: &u32| {
+            let s = *s as usize;
+            bordered[s] && volume[s] < 1e-3 * area[s].powf(1.5)
+        };
+        self.with_label(Design::Design).filter(hollow).collect()
+    }
+
     /// The faces of `set`.
     pub(crate) fn faces(&self, set: u32) -> Vec<FaceId> {
         (0..self.of_face.len()).filter(|&f| self.of_face[f] == set).map(FaceId::new).collect()

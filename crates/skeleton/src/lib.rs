@@ -53,13 +53,40 @@ pub fn skeletonize(
     if !part.design.contains(&Design::Design) {
         return Err(SkeletonError::NoDesign);
     }
-    let sets = interface::Sets::find(part, &connectivity);
-    match parameters.method {
+    // Design patches with no material behind them, such as a dent that reaches into a non-design part, have no axis.
+    // They count as part of what they lie on; that may join others to it, so look again.
+    let mut part = std::borrow::Cow::Borrowed(part);
+    let mut patches = 0;
+    let mut sets = interface::Sets::find(&part, &connectivity);
+    for _ in 0..8 {
+        let hollow = sets.hollow(&part.mesh);
+        if hollow.is_empty() {
+            break;
+        }
+        patches += hollow.len();
+        let labels = &mut part.to_mut().design;
+        for (label, set) in labels.iter_mut().zip(&sets.of_face) {
+            if hollow.binary_search(set).is_ok() {
+                *label = Design::NonDesign;
+            }
+        }
+        sets = interface::Sets::find(&part, &connectivity);
+    }
+    let mut skeleton = match parameters.method {
         Method::IdentifierBox => {
-            identifier_box::skeletonize(part, parameters, &connectivity, &sets, progress)
+            identifier_box::skeletonize(&part, parameters, &connectivity, &sets, progress)
         }
         Method::MarchingSections => {
-            marching_sections::skeletonize(part, parameters, &connectivity, &sets, progress)
+            marching_sections::skeletonize(&part, parameters, &connectivity, &sets, progress)
         }
+    }?;
+    if patches > 0 {
+        skeleton
+            .remarks
+            .insert(0, format!("{patches} design patches enclose no material and were taken for non-design"));
     }
+    for remark in &skeleton.remarks {
+        progress.remark(remark);
+    }
+    Ok(skeleton)
 }

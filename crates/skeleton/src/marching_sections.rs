@@ -33,6 +33,8 @@ use section::Cutter;
 use topipe_mesh::{Connectivity, Design, Part, VertexId};
 use topipe_progress::Progress;
 
+/// Shifts tried where a cycle hides. Of the fixtures only beam-two-holes needs any, and one.
+const SHIFTS: usize = 8;
 /// A branch between two junctions with a shorter clean axis than this many radii is a part of one junction.
 const SHORTEST: f64 = 1.0;
 /// A branch with a longer clean axis than this many radii stands on its own, wherever the axes beside it meet.
@@ -49,8 +51,16 @@ pub(crate) fn skeletonize(
     let mut skeleton = Skeleton::new(Method::MarchingSections);
     let interface_points: Vec<_> = (sets.interfaces.iter())
         .map(|i| {
+            // Around a hole the centre of the loop is in the void: then a place just below its surface.
+            let below = i.half_edges.iter().map(|h| {
+                let face = h.face();
+                let depth = 0.1 * part.mesh.area_vector(face).length().sqrt();
+                part.mesh.centroid(face) - depth * part.mesh.normal(face)
+            });
             let choices = [Some(i.centroid), Some(i.node_mean), inside.nearest_middle(i.centroid)];
-            let point = choices.into_iter().flatten().find(|&p| inside.contains(p)).unwrap_or(i.centroid);
+            let point = (choices.into_iter().flatten().chain(below))
+                .find(|&p| inside.contains(p))
+                .unwrap_or(i.centroid);
             skeleton.add_point(point, PointKind::Interface, Section::None)
         })
         .collect();
@@ -88,10 +98,21 @@ fn trace(
     remarks: &mut Vec<String>,
 ) -> Result<(BranchGraph, Vec<Axis>), SkeletonError> {
     let sources = if piece.rims.is_empty() { vec![far_tip(piece)] } else { piece.rims.clone() };
-    let value = geodesic::distance(piece, &sources);
+    let mut value = geodesic::distance(piece, &sources);
     progress.check()?;
-    let reeb = ReebGraph::build(&piece.connectivity, &value);
     let genus = piece.connectivity.genus(&piece.mesh).unwrap_or(0);
+    let mut reeb = ReebGraph::build(&piece.connectivity, &value);
+    // A vertex in which one loop both splits and merges hides a cycle; a small shift takes it apart.
+    for _ in 0..SHIFTS {
+        if reeb.cycles() == genus {
+            break;
+        }
+        progress.check()?;
+        for v in reeb.multiple_saddles(&piece.connectivity) {
+            value[v.index()] = reeb.shifted(&piece.connectivity, &value, v);
+        }
+        reeb = ReebGraph::build(&piece.connectivity, &value);
+    }
     if reeb.cycles() != genus {
         remarks.push(format!(
             "{} of {genus} loops of a design set are lost in a vertex where many level lines meet",

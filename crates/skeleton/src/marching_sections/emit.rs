@@ -134,7 +134,7 @@ fn centred(
 ) -> Vec<(DVec3, Section)> {
     let radius = axis.radius();
     if axis.sections.len() < 2 || radius <= 0.0 {
-        return without_axis(branch, least, inside);
+        return without_axis(branch, ends, least, inside);
     }
     let ring = ends[0].point.is_none();
     let sections = if ring { &axis.sections[..] } else { between(&axis.sections, ends, least) };
@@ -148,7 +148,7 @@ fn centred(
     let mut picked: Vec<usize> = (0..count).map(pick).collect();
     picked.dedup();
     if picked.len() < least {
-        return without_axis(branch, least, inside);
+        return without_axis(branch, ends, least, inside);
     }
     let mut points: Vec<Loop> = picked.into_iter().map(|k| sections[k].clone()).collect();
     let near = 2.5 * radius;
@@ -228,18 +228,19 @@ fn between(sections: &[Loop], ends: [Place; 2], least: usize) -> &[Loop] {
 }
 
 /// Points for a branch that has no clean section: the level loops are all there is.
-fn without_axis(branch: &Branch, least: usize, inside: &Inside) -> Vec<(DVec3, Section)> {
-    let line: Vec<_> = branch.samples.iter().map(|s| s.point).collect();
-    let Some(&first) = line.first() else {
-        return Vec::new();
-    };
+fn without_axis(branch: &Branch, ends: [Place; 2], least: usize, inside: &Inside) -> Vec<(DVec3, Section)> {
+    // A handle of a few triangles may not even have those; its cycle is kept all the same.
+    let mut line: Vec<_> = branch.samples.iter().map(|s| s.point).collect();
+    if line.len() < least {
+        line.insert(0, ends[0].at);
+        line.push(ends[1].at);
+    }
     let length: f64 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
-    let mut points = if line.len() < 2 { vec![first; least] } else { resample(&line, length / 6.0) };
-    if points.len() > least.max(1) {
+    let mut points = if length > 0.0 { resample(&line, length / 6.0) } else { vec![ends[0].at; least] };
+    if points.len() > least {
         let n = points.len();
         points = (0..least).map(|k| points[(k + 1) * n / (least + 1)]).collect();
     }
-    points.truncate(least);
     points.into_iter().map(|p| (within(p, inside), Section::None)).collect()
 }
 

@@ -101,6 +101,43 @@ impl ReebGraph {
         }
     }
 
+    /// The critical vertices around which the function rises and falls more than twice.
+    pub(super) fn multiple_saddles(&self, connectivity: &Connectivity) -> Vec<VertexId> {
+        self.nodes.iter().copied().filter(|&v| self.wedges(connectivity, v).len() > 4).collect()
+    }
+
+    /// A value for `v` just past the lowest of the rises or falls around it, which is then no longer there.
+    pub(super) fn shifted(&self, connectivity: &Connectivity, value: &[f64], v: VertexId) -> f64 {
+        let here = value[v.index()];
+        let past = (self.wedges(connectivity, v).into_iter())
+            .map(|wedge| {
+                let away = |w: &VertexId| value[w.index()] - here;
+                wedge.iter().map(away).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+            })
+            .min_by(|a, b| a.abs().total_cmp(&b.abs()))
+            .unwrap_or(0.0);
+        here + past * 1.01
+    }
+
+    /// The neighbours of `v` in runs that lie above it and runs that lie below.
+    fn wedges(&self, connectivity: &Connectivity, v: VertexId) -> Vec<Vec<VertexId>> {
+        let ring: Vec<_> = connectivity.outgoing(v).map(|h| connectivity.target(h)).collect();
+        let above = |w: VertexId| self.rank[w.index()] > self.rank[v.index()];
+        let n = ring.len();
+        let Some(first) = (0..n).find(|&k| above(ring[k]) != above(ring[(k + n - 1) % n])) else {
+            return vec![ring];
+        };
+        let mut wedges: Vec<Vec<VertexId>> = Vec::new();
+        for k in 0..n {
+            let w = ring[(first + k) % n];
+            match wedges.last_mut() {
+                Some(wedge) if above(wedge[0]) == above(w) => wedge.push(w),
+                _ => wedges.push(vec![w]),
+            }
+        }
+        wedges
+    }
+
     /// Independent cycles of the graph, which is connected when the mesh is.
     pub(super) fn cycles(&self) -> i64 {
         self.arcs.len() as i64 - self.nodes.len() as i64 + 1
