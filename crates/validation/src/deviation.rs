@@ -1,0 +1,159 @@
+//! How far two surfaces are from each other, both ways.
+//!
+//! Each surface is a triangulation to find nearest points on, and samples with a share of its area. A mesh is sampled
+//! at its vertices and centroids with the weights of the rule that is exact for quadratic functions (1/12 a corner,
+//! 3/4 the centroid); a spline surface at a grid of points on it. Where the other surface is a spline, the nearest
+//! point of its triangulation is the start of an iteration to the foot point on the patch itself.
+
+use crate::DeviationFigures;
+use rayon::prelude::*;
+use topipe_mesh::spatial::{NearestPoint, SurfaceIndex};
+use topipe_mesh::{DVec3, TriangleMesh};
+
+/// Samples that are measured as one piece of work: fixed, so sums do not depend on the number of threads.
+const CHUNK: usize = 1024;
+
+/// From the nearest point of the triangulation to the distance from the true surface.
+pub(crate) type Refine<'a> = Box<dyn Fn(DVec3, &NearestPoint) -> f64 + Sync + 'a>;
+
+/// A surface ready for comparison.
+pub(crate) struct Surface<'a> {
+    pub(crate) index: SurfaceIndex,
+    /// Points and the area each stands for.
+    samples: Vec<(DVec3, f64)>,
+    refine: Option<Refine<'a>>,
+}
+
+impl<'a> Surface<'a> {
+    pub(crate) fn of_mesh(mesh: &TriangleMesh) -> Self {
+        let mut weights = vec![0.0; mesh.vertex_count()];
+        let mut centroids = Vec::with_capacity(mesh.face_count());
+        for f in mesh.faces() {
+            let area = mesh.area_vector(f).length() / 2.0;
+            for v in mesh.triangles[f.index()] {
+                weights[v.index()] += area / 12.0;
+            }
+            centroids.push((mesh.centroid(f), 0.75 * area));
+        }
+        let used = mesh.positions.iter().copied().zip(weights).filter(|&(_, weight)| weight > 0.0);
+        let samples = used.chain(centroids).collect();
+        Self { index: SurfaceIndex::build(mesh), samples, refine: None }
+    }
+
+    pub(crate) fn of_samples(
+        triangulation: &TriangleMesh,
+        samples: Vec<(DVec3, f64)>,
+        refine: Refine<'a>,
+    ) -> Self {
+        Self { index: SurfaceIndex::build(triangulation), samples, refine: Some(refine) }
+    }
+
+    pub(crate) fn distance(&self, p: DVec3) -> f64 {
+        match (self.index.nearest(p), &self.refine) {
+            (None, _) => f64::INFINITY,
+            (Some(nearest), None) => nearest.distance,
+            (Some(nearest), Some(refine)) => refine(p, &nearest),
+        }
+    }
+}
+
+/// One side: the samples of `from` and their distances from `to`.
+struct Side {
+    mean: f64,
+    mean_square: f64,
+    p95: f64,
+    max: (f64, DVec3),
+}
+
+fn side(from: &Surface<'_>, to: &Surface<'_>) -> Option<Side> {
+    let mut distances: Vec<(f64, f64)> = from
+        .samples
+        .par_chunks(CHUNK)
+        .flat_map_iter(|chunk| chunk.iter().map(|&(p, weight)| (to.distance(p), weight)))
+        .collect();
+    let area: f64 = distances.iter().map(|&(_, weight)| weight).sum();
+    if !(area > 0.0 && area.is_finite()) {
+        return None;
+    }
+    let mean = distances.iter().map(|&(d, w)| d * w).sum::<f64>() / area;
+    let mean_square = distances.iter().map(|&(d, w)| d * d * w).sum::<f64>() / area;
+    let (mut max, mut at) = (f64::NEG_INFINITY, DVec3::ZERO);
+    for (&(d, _), &(p, _)) in distances.iter().zip(&from.samples) {
+        if d > max {
+            (max, at) = (d, p);
+        }
+    }
+    distances.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut below, mut p95) = (0.0, max);
+    for (d, weight) in distances {
+        below += weight;
+        if below >= 0.95 * area {
+            p95 = d;
+            break;
+        }
+    }
+    Some(Side { mean, mean_square, p95, max: (max, at) })
+}
+
+/// The two-sided deviation, `None` where a surface has no area.
+pub(crate) fn between(a: &Surface<'_>, b: &Surface<'_>, diagonal: f64) -> Option<DeviationFigures> {
+    if a.index.is_empty() || b.index.is_empty() {
+        return None;
+    }
+    let (there, back) = (side(a, b)?, side(b, a)?);
+    let mean_mm = (there.mean + back.mean) / 2.0;
+    let max = if back.max.0 > there.max.0 { back.max } else { there.max };
+    Some(DeviationFigures {
+        mean_mm,
+        rms_mm: ((there.mean_square + back.mean_square) / 2.0).sqrt(),
+        p95_mm: there.p95.max(back.p95),
+        max_mm: max.0,
+        mean_rel: mean_mm / diagonal,
+        max_rel: max.0 / diagonal,
+        max_at: max.1.to_array(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::topology;
+
+    fn plate(z: f64, size: f64) -> TriangleMesh {
+        let s = size / 2.0;
+        TriangleMesh::from_arrays(
+            vec![[-s, -s, z], [s, -s, z], [s, s, z], [-s, s, z]],
+            vec![[0, 1, 2], [0, 2, 3]],
+        )
+    }
+
+    #[test]
+    fn parallel_plates_are_their_distance_apart() {
+        let (a, b) = (plate(0.0, 2.0), plate(0.25, 2.0));
+        let figures = between(&Surface::of_mesh(&a), &Surface::of_mesh(&b), a.diagonal()).unwrap();
+        for value in [figures.mean_mm, figures.rms_mm, figures.p95_mm, figures.max_mm] {
+            assert!((value - 0.25).abs() < 1e-15, "{value}");
+        }
+        assert!((figures.max_rel - 0.25 / 8f64.sqrt()).abs() < 1e-15);
+        assert!(!topology::count(&a).closed);
+    }
+
+    #[test]
+    fn what_sticks_out_is_seen_from_either_side() {
+        let (small, large) = (plate(0.0, 2.0), plate(0.0, 4.0));
+        for (a, b) in [(&small, &large), (&large, &small)] {
+            let figures = between(&Surface::of_mesh(a), &Surface::of_mesh(b), 1.0).unwrap();
+            assert!((figures.max_mm - 2f64.sqrt()).abs() < 1e-12, "the corner of the large plate");
+            assert_eq!(figures.max_at.map(f64::abs), [2.0, 2.0, 0.0]);
+        }
+    }
+
+    #[test]
+    fn a_surface_without_area_has_no_deviation() {
+        let empty = Surface::of_mesh(&TriangleMesh::default());
+        assert_eq!(between(&empty, &Surface::of_mesh(&plate(0.0, 1.0)), 1.0), None);
+        let flat =
+            TriangleMesh::from_arrays(vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], vec![[0, 1, 2]]);
+        assert_eq!(between(&Surface::of_mesh(&flat), &Surface::of_mesh(&plate(0.0, 1.0)), 1.0), None);
+    }
+}

@@ -1,0 +1,253 @@
+//! The report: lengths in millimetres, angles in degrees.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// All figures. A section is there when its artifact was given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// The part as imported.
+    pub original: OriginalFigures,
+    /// The smoothed part against the original.
+    pub smoothing: Option<SmoothingFigures>,
+    /// The quadrilateral layout.
+    pub layout: Option<LayoutFigures>,
+    /// The spline surface.
+    pub surface: Option<SurfaceFigures>,
+    /// The skeleton.
+    pub skeleton: Option<SkeletonFigures>,
+}
+
+/// The part as imported.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OriginalFigures {
+    /// Vertices that have faces.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Summed over the components; `null` where the surface is not closed.
+    pub genus: Option<i64>,
+    /// Connected components.
+    pub components: usize,
+    /// Signed volume.
+    pub volume_mm3: f64,
+    /// Area.
+    pub area_mm2: f64,
+    /// Lowest and highest corner of the bounding box.
+    pub bounds: [[f64; 3]; 2],
+    /// What import had to repair.
+    pub repairs: Vec<RepairFigures>,
+}
+
+/// One kind of repair.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RepairFigures {
+    /// What was done.
+    pub what: String,
+    /// How many times.
+    pub count: u64,
+}
+
+/// Two-sided distance between two surfaces: each side is averaged over its area and counts half; the largest is over
+/// both. `_rel` is over the diagonal of the bounding box of the original.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DeviationFigures {
+    /// Mean distance.
+    pub mean_mm: f64,
+    /// Root of the mean of the squared distance.
+    pub rms_mm: f64,
+    /// 95 % of the area are nearer than this, on the worse side.
+    pub p95_mm: f64,
+    /// The largest distance of a sample.
+    pub max_mm: f64,
+    /// Mean over the diagonal.
+    pub mean_rel: f64,
+    /// Largest over the diagonal.
+    pub max_rel: f64,
+    /// The sample that is farthest away.
+    pub max_at: [f64; 3],
+}
+
+/// A hole before and after.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Hole {
+    /// Unit direction of the axis, after; its largest component is positive.
+    pub axis: [f64; 3],
+    /// The point of the axis in the middle of the wall, after.
+    pub point: [f64; 3],
+    /// Of the cylinder fitted to the wall in the original; `null` where the wall is not found there.
+    pub diameter_before_mm: Option<f64>,
+    /// Of the cylinder fitted to the wall now.
+    pub diameter_after_mm: f64,
+    /// Largest distance of a vertex of the wall from that cylinder.
+    pub roundness_mm: f64,
+}
+
+/// A plane face before and after.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FlatFace {
+    /// Its outward unit normal, after.
+    pub normal: [f64; 3],
+    /// Its centroid, after.
+    pub point: [f64; 3],
+    /// Its area, after.
+    pub area_mm2: f64,
+    /// Largest distance of one of its vertices from its mean plane in the original; `null` where it is not found.
+    pub flatness_before_mm: Option<f64>,
+    /// The same now.
+    pub flatness_after_mm: f64,
+}
+
+/// The smoothed part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SmoothingFigures {
+    /// The method, as in the spec; "none" for a part that was not smoothed.
+    pub method: String,
+    /// Iterations made.
+    pub iterations: u32,
+    /// Whether the tolerance was reached.
+    pub converged: bool,
+    /// Signed volume.
+    pub volume_mm3: f64,
+    /// Volume over that of the original, minus 1.
+    pub volume_error: f64,
+    /// Sum over the vertices of the distance from their first place; `null` where the vertices are not the same.
+    pub total_change_mm: Option<f64>,
+    /// The way all vertices have travelled, as smoothing says.
+    pub cumulative_change_mm: f64,
+    /// Vertices marked as frozen.
+    pub frozen_vertices: usize,
+    /// Those of them that are not where they were, bit for bit: 0.
+    pub frozen_moved: usize,
+    /// Holes.
+    pub holes: Vec<Hole>,
+    /// Plane faces.
+    pub flat_faces: Vec<FlatFace>,
+    /// Smoothed part against original.
+    pub deviation: Option<DeviationFigures>,
+}
+
+/// The quadrilateral layout.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LayoutFigures {
+    /// Tiles of the tessellation it is the dual of.
+    pub tiles: u32,
+    /// Macro-triangles that were matched.
+    pub macro_triangles: u32,
+    /// Quadrilaterals.
+    pub quads: usize,
+    /// By counting vertices, edges and quads; `null` where the layout is not closed.
+    pub genus: Option<i64>,
+    /// How many macro-vertices have so many quads.
+    pub valences: BTreeMap<u32, usize>,
+    /// Largest corner of a quad, measured on the mesh: the angles of its faces there, summed.
+    pub max_corner_angle_deg: f64,
+    /// Smallest scaled Jacobian of the quads with straight sides: 1 for a rectangle, 0 and below for a quad that is
+    /// folded.
+    pub min_scaled_jacobian: f64,
+}
+
+/// Angles between the normals of two patches.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NormalJump {
+    /// Largest.
+    pub max: f64,
+    /// 99 % are smaller.
+    pub p99: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Edges compared.
+    pub edges: usize,
+    /// Points compared.
+    pub points: usize,
+    /// Points left out because a patch has no normal there.
+    pub singular: usize,
+    /// Where the largest is.
+    pub max_at: [f64; 3],
+}
+
+/// Feature edges of one kind.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FeatureFigures {
+    /// hole-rim, region-border, label-border, sharp or user.
+    pub kind: String,
+    /// Edge curves.
+    pub edges: usize,
+    /// Their length.
+    pub length_mm: f64,
+    /// The smallest angle between the normals of the mesh along them; `null` where the mesh is no manifold.
+    pub min_dihedral_deg: Option<f64>,
+}
+
+/// The spline surface.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceFigures {
+    /// Patches.
+    pub patches: usize,
+    /// Distinct control points: shared ones count once.
+    pub control_points: usize,
+    /// Every edge is used by exactly two patches in opposite directions, and the sides of every patch form a loop.
+    pub closed: bool,
+    /// By counting; `null` where the surface is not closed.
+    pub genus: Option<i64>,
+    /// By quadrature over the patches.
+    pub volume_mm3: f64,
+    /// Volume over that of the smoothed mesh, minus 1.
+    pub volume_error: f64,
+    /// Against the smoothed mesh.
+    pub deviation: Option<DeviationFigures>,
+    /// Against the original.
+    pub deviation_original: Option<DeviationFigures>,
+    /// Over edges that are not features; `null` without such edges.
+    pub normal_jump_deg: Option<NormalJump>,
+    /// Feature edges by kind.
+    pub features: Vec<FeatureFigures>,
+    /// Largest distance between the two patches at an edge; exactly 0 where they share their control points.
+    pub gap_mm: f64,
+    /// Faces that are planes.
+    pub planes: usize,
+    /// Faces that are cylinders.
+    pub cylinders: usize,
+}
+
+/// The skeleton.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SkeletonFigures {
+    /// Points on branches.
+    pub compactness: usize,
+    /// Mean over them of the largest difference of opposite rays, over the radius of the bounding sphere; `null`
+    /// without such points.
+    pub e_center: Option<f64>,
+    /// The same, weighted by the length of branch that a point stands for.
+    pub e_center_by_length: Option<f64>,
+    /// Points outside the part.
+    pub out_of_object: usize,
+    /// Points where more than two edges meet.
+    pub junctions: usize,
+    /// Chains of edges between junctions and ends; a closed chain counts once.
+    pub branches: usize,
+    /// Edges - points + components.
+    pub cycles: i64,
+    /// Of the mesh; `null` where it is open.
+    pub genus: Option<i64>,
+    /// Connected components.
+    pub components: usize,
+    /// Points with one edge.
+    pub free_ends: usize,
+    /// Length of all edges.
+    pub length_mm: f64,
+}
+
+impl Report {
+    /// The report as JSON with the contract's names. Sections of artifacts that were not given are left out.
+    pub fn to_json(&self) -> String {
+        // Numbers, strings and maps with printable keys: nothing that JSON can not hold.
+        let mut value = serde_json::to_value(self).unwrap_or_default();
+        if let Some(sections) = value.as_object_mut() {
+            sections.retain(|_, section| !section.is_null());
+        }
+        let mut text = format!("{value:#}");
+        text.push('\n');
+        text
+    }
+}

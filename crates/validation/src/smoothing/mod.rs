@@ -1,0 +1,47 @@
+//! The smoothed part against the original.
+
+mod regions;
+
+use crate::{DeviationFigures, SmoothingFigures};
+use topipe_mesh::{Part, Provenance};
+
+pub(crate) fn figures(original: &Part, part: &Part, deviation: Option<DeviationFigures>) -> SmoothingFigures {
+    let record = part.smoothing.clone().unwrap_or_default();
+    let (before, volume_mm3) = (original.mesh.volume(), part.mesh.volume());
+    let same_vertices = original.mesh.vertex_count() == part.mesh.vertex_count();
+    let total_change_mm = same_vertices.then(|| {
+        part.mesh.positions.iter().zip(&original.mesh.positions).map(|(a, b)| a.distance(*b)).sum::<f64>()
+    });
+    SmoothingFigures {
+        method: if part.smoothing.is_some() { record.method } else { "none".to_owned() },
+        iterations: record.iterations,
+        converged: record.converged,
+        volume_mm3,
+        volume_error: volume_mm3 / before - 1.0,
+        total_change_mm,
+        cumulative_change_mm: record.cumulative_change,
+        frozen_vertices: part.frozen.iter().filter(|&&frozen| frozen).count(),
+        frozen_moved: frozen_moved(original, part, same_vertices),
+        holes: regions::holes(original, part),
+        flat_faces: regions::flat_faces(original, part),
+        deviation,
+    }
+}
+
+/// Frozen vertices whose coordinates differ in a bit from those they had.
+fn frozen_moved(original: &Part, part: &Part, same_vertices: bool) -> usize {
+    let frozen = part.mesh.vertices().filter(|v| part.frozen[v.index()]);
+    frozen
+        .filter(|v| {
+            // Smoothing keeps the numbering; a remeshed part says where a vertex came from.
+            let source = match part.provenance[v.index()] {
+                _ if same_vertices => Some(*v),
+                Provenance::Vertex(source) => Some(source),
+                Provenance::Edge { .. } | Provenance::Face { .. } => None,
+            };
+            let before = source.and_then(|s| original.mesh.positions.get(s.index()));
+            let bits = |p: topipe_mesh::DVec3| p.to_array().map(f64::to_bits);
+            before.is_none_or(|&p| bits(p) != bits(part.mesh.position(*v)))
+        })
+        .count()
+}

@@ -1,0 +1,182 @@
+//! The report for people.
+
+use crate::{DeviationFigures, Report};
+use std::fmt::Write;
+
+fn genus(genus: Option<i64>) -> String {
+    genus.map_or_else(|| "unknown (open)".to_owned(), |g| g.to_string())
+}
+
+/// A figure with four digits, without exponents where none are needed.
+fn figure(x: f64) -> String {
+    match x.abs() {
+        0.0 => "0".to_owned(),
+        a if (1e-3..1e4).contains(&a) => {
+            let digits = (3 - a.log10().floor() as i32).clamp(0, 6) as usize;
+            format!("{x:.digits$}")
+        }
+        a if (1e4..1e15).contains(&a) => format!("{x:.0}"),
+        _ => format!("{x:.2e}"),
+    }
+}
+
+fn deviation(deviation: &DeviationFigures) -> String {
+    let [x, y, z] = deviation.max_at.map(figure);
+    format!(
+        "mean {} mm ({} of the diagonal), rms {} mm, max {} mm ({}) at ({x}, {y}, {z})",
+        figure(deviation.mean_mm),
+        figure(deviation.mean_rel),
+        figure(deviation.rms_mm),
+        figure(deviation.max_mm),
+        figure(deviation.max_rel),
+    )
+}
+
+impl Report {
+    /// A summary for the terminal: one paragraph per artifact, a few lines each.
+    pub fn summary(&self) -> String {
+        let mut text = String::new();
+        // Writing to a string does not fail.
+        let _ = self.write_summary(&mut text);
+        text
+    }
+
+    fn write_summary(&self, text: &mut String) -> std::fmt::Result {
+        let o = &self.original;
+        writeln!(
+            text,
+            "original   {} triangles, genus {}, {} component{}, volume {} mm3, area {} mm2",
+            o.triangles,
+            genus(o.genus),
+            o.components,
+            if o.components == 1 { "" } else { "s" },
+            figure(o.volume_mm3),
+            figure(o.area_mm2)
+        )?;
+        for repair in &o.repairs {
+            writeln!(text, "           repaired: {} ({})", repair.what, repair.count)?;
+        }
+        if let Some(s) = &self.smoothing {
+            let converged = if s.converged { "converged" } else { "not converged" };
+            writeln!(
+                text,
+                "smoothing  {}, {} iterations ({converged}), volume error {}, {} frozen vertices ({} moved)",
+                s.method,
+                s.iterations,
+                figure(s.volume_error),
+                s.frozen_vertices,
+                s.frozen_moved
+            )?;
+            for hole in &s.holes {
+                let [x, y, z] = hole.point.map(figure);
+                let before = hole.diameter_before_mm.map_or_else(|| "?".to_owned(), |d| format!("{d:.6}"));
+                writeln!(
+                    text,
+                    "           hole at ({x}, {y}, {z}): diameter {before} -> {:.6} mm",
+                    hole.diameter_after_mm
+                )?;
+            }
+            if !s.flat_faces.is_empty() {
+                let worst = s.flat_faces.iter().map(|f| f.flatness_after_mm).fold(0.0, f64::max);
+                writeln!(text, "           {} flat faces, flat to {} mm", s.flat_faces.len(), figure(worst))?;
+            }
+            if let Some(d) = &s.deviation {
+                writeln!(text, "           from the original: {}", deviation(d))?;
+            }
+        }
+        if let Some(l) = &self.layout {
+            let valences: Vec<String> = l.valences.iter().map(|(v, n)| format!("{n} of {v}")).collect();
+            writeln!(
+                text,
+                "layout     {} tiles, {} macro-triangles, {} quads, genus {}",
+                l.tiles,
+                l.macro_triangles,
+                l.quads,
+                genus(l.genus)
+            )?;
+            writeln!(
+                text,
+                "           largest corner {} degrees, smallest scaled Jacobian {}, valences: {}",
+                figure(l.max_corner_angle_deg),
+                figure(l.min_scaled_jacobian),
+                valences.join(", ")
+            )?;
+        }
+        if let Some(s) = &self.surface {
+            writeln!(
+                text,
+                "surface    {} patches, {} control points, {}, genus {}, volume {} mm3 (error {}), gap {} mm",
+                s.patches,
+                s.control_points,
+                if s.closed { "closed" } else { "NOT CLOSED" },
+                genus(s.genus),
+                figure(s.volume_mm3),
+                figure(s.volume_error),
+                figure(s.gap_mm)
+            )?;
+            if let Some(d) = &s.deviation {
+                writeln!(text, "           from the smoothed mesh: {}", deviation(d))?;
+            }
+            if let Some(d) = &s.deviation_original {
+                writeln!(text, "           from the original: {}", deviation(d))?;
+            }
+            if let Some(j) = &s.normal_jump_deg {
+                let [x, y, z] = j.max_at.map(figure);
+                writeln!(
+                    text,
+                    "           normal jump over {} edges: mean {}, p99 {}, max {} degrees at ({x}, {y}, {z})",
+                    j.edges,
+                    figure(j.mean),
+                    figure(j.p99),
+                    figure(j.max)
+                )?;
+            }
+            for f in &s.features {
+                let dihedral = f.min_dihedral_deg.map_or_else(|| "?".to_owned(), figure);
+                writeln!(
+                    text,
+                    "           {} features ({}): {} mm, at least {dihedral} degrees",
+                    f.edges,
+                    f.kind,
+                    figure(f.length_mm)
+                )?;
+            }
+        }
+        if let Some(s) = &self.skeleton {
+            let e = |e: Option<f64>| e.map_or_else(|| "?".to_owned(), figure);
+            writeln!(
+                text,
+                "skeleton   {} branch points, {} branches, {} junctions, {} mm; E_center {} ({} by length)",
+                s.compactness,
+                s.branches,
+                s.junctions,
+                figure(s.length_mm),
+                e(s.e_center),
+                e(s.e_center_by_length)
+            )?;
+            writeln!(
+                text,
+                "           {} points outside, {} cycles for genus {}",
+                s.out_of_object,
+                s.cycles,
+                genus(s.genus)
+            )?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::figure;
+
+    #[test]
+    fn figures_have_four_digits() {
+        for (x, text) in
+            [(0.0, "0"), (1.0, "1.000"), (-12.3456, "-12.35"), (123456.7, "123457"), (2.5e-9, "2.50e-9")]
+        {
+            assert_eq!(figure(x), text);
+        }
+        assert_eq!(figure(f64::NAN), "NaN");
+    }
+}

@@ -1,0 +1,116 @@
+//! Normals and gaps along the edges that two patches share, from both patches.
+
+use crate::NormalJump;
+use rayon::prelude::*;
+use topipe_mesh::DVec3;
+use topipe_spline_fit::{EdgeCurve, Patch, SplineSurface};
+
+/// One patch at an edge: which, with which of its sides, and whether it runs against the edge.
+#[derive(Debug, Clone, Copy)]
+struct Use {
+    patch: u32,
+    side: usize,
+    reversed: bool,
+}
+
+/// What one edge has to say.
+#[derive(Default)]
+struct EdgeResult {
+    jumps: Vec<(f64, DVec3)>,
+    singular: usize,
+    gap: f64,
+}
+
+/// The angle between unit vectors, to full accuracy where it is small.
+pub(super) fn angle(a: DVec3, b: DVec3) -> f64 {
+    a.cross(b).length().atan2(a.dot(b))
+}
+
+/// Normal jumps over edges that are not features, and the largest gap over all edges.
+pub(super) fn along_edges(surface: &SplineSurface, points: u32) -> (Option<NormalJump>, f64) {
+    let mut uses = vec![Vec::new(); surface.edges.len()];
+    for (patch, p) in surface.patches.iter().enumerate() {
+        for (side, s) in p.sides.iter().enumerate() {
+            uses[s.edge as usize].push(Use { patch: patch as u32, side, reversed: s.reversed });
+        }
+    }
+    let results: Vec<EdgeResult> = surface
+        .edges
+        .par_iter()
+        .zip(&uses)
+        .map(|(edge, uses)| match uses[..] {
+            [a, b] => compare(surface, edge, a, b, points),
+            _ => EdgeResult::default(),
+        })
+        .collect();
+
+    let gap = results.iter().map(|r| r.gap).fold(0.0, f64::max);
+    let edges = results.iter().filter(|r| !r.jumps.is_empty()).count();
+    let mut jumps: Vec<(f64, DVec3)> = results.iter().flat_map(|r| r.jumps.iter().copied()).collect();
+    // Stable: of equal jumps the first edge comes first.
+    jumps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let jump = jumps.last().map(|&(max, at)| NormalJump {
+        max,
+        p99: jumps[((jumps.len() - 1) as f64 * 0.99) as usize].0,
+        mean: jumps.iter().map(|j| j.0).sum::<f64>() / jumps.len() as f64,
+        edges,
+        points: jumps.len(),
+        singular: results.iter().map(|r| r.singular).sum(),
+        max_at: at.to_array(),
+    });
+    (jump, gap)
+}
+
+fn compare(surface: &SplineSurface, edge: &EdgeCurve, a: Use, b: Use, points: u32) -> EdgeResult {
+    let mut result = EdgeResult::default();
+    let shared = [a, b].iter().all(|u| shares_controls(&surface.patches[u.patch as usize], edge, *u));
+    for k in 0..points {
+        let t = (f64::from(k) + 0.5) / f64::from(points);
+        let at = |u: Use| {
+            let along = if u.reversed { 1.0 - t } else { t };
+            let (x, y) = Patch::side_parameters(u.side, along);
+            surface.patches[u.patch as usize].evaluate(x, y)
+        };
+        let (p, q) = (at(a), at(b));
+        if !shared {
+            result.gap = result.gap.max(p.position.distance(q.position));
+        }
+        if edge.feature.is_none() {
+            let (n, m) = (p.normal(), q.normal());
+            if n == DVec3::ZERO || m == DVec3::ZERO {
+                result.singular += 1;
+            } else {
+                result.jumps.push((angle(n, m).to_degrees(), p.position));
+            }
+        }
+    }
+    result
+}
+
+/// Whether the border row of the patch and its knots are those of the curve, bit for bit: then both sides are the
+/// same curve, and a difference of their values would be rounding.
+fn shares_controls(patch: &Patch, edge: &EdgeCurve, u: Use) -> bool {
+    let (width, height) = (patch.basis_u.len(), patch.basis_v.len());
+    let (basis, row): (_, Vec<usize>) = match u.side {
+        0 => (&patch.basis_u, (0..width).collect()),
+        1 => (&patch.basis_v, (0..height).map(|j| width - 1 + j * width).collect()),
+        2 => (&patch.basis_u, (0..width).rev().map(|i| i + (height - 1) * width).collect()),
+        _ => (&patch.basis_v, (0..height).rev().map(|j| j * width).collect()),
+    };
+    // Sides 2 and 3 run against the parameter; a reversed side runs against the curve.
+    let mirrored = (u.side >= 2) != u.reversed;
+    let same_knots = if mirrored {
+        let mirror: Vec<f64> = edge.basis.knots().iter().rev().map(|k| 1.0 - k).collect();
+        // 1 - k is not exact for every k: a knot may differ in its last bit.
+        mirror.len() == basis.knots().len()
+            && mirror.iter().zip(basis.knots()).all(|(a, b)| (a - b).abs() <= f64::EPSILON)
+    } else {
+        edge.basis.knots() == basis.knots()
+    };
+    let bits = |p: DVec3| p.to_array().map(f64::to_bits);
+    let along = |k: usize| if u.reversed { row.len() - 1 - k } else { k };
+    same_knots
+        && edge.basis.degree() == basis.degree()
+        && row.len() == edge.control.len()
+        && (0..row.len()).all(|k| bits(patch.control[row[along(k)]]) == bits(edge.control[k]))
+}

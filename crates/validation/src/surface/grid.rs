@@ -1,0 +1,160 @@
+//! Points on a spline surface, a triangulation between them, and the way from the triangulation to the surface.
+
+use crate::deviation::Surface;
+use rayon::prelude::*;
+use topipe_mesh::spatial::NearestPoint;
+use topipe_mesh::{DVec3, TriangleMesh, VertexId};
+use topipe_spline_fit::{Patch, SplineSurface};
+
+/// Cells along a side of a patch.
+const CELLS: std::ops::RangeInclusive<usize> = 4..=128;
+/// Steps of Gauss-Newton towards a foot point. Three bring the error below 1e-9 of a cell on the bracket; a step that
+/// does not improve ends the search earlier.
+const STEPS: usize = 4;
+
+/// The points of one patch.
+struct Grid {
+    /// Point, area it stands for, parameters.
+    points: Vec<(DVec3, f64, [f64; 2])>,
+    cells: [usize; 2],
+}
+
+/// Samples `surface` on a grid of about `spacing`.
+pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
+    let grids: Vec<Grid> = surface.patches.par_iter().map(|patch| grid(patch, spacing)).collect();
+    let (mut mesh, mut samples) = (TriangleMesh::default(), Vec::new());
+    let (mut patch_of_face, mut parameters) = (Vec::new(), Vec::new());
+    for (patch, Grid { points, cells }) in grids.into_iter().enumerate() {
+        let first = mesh.positions.len();
+        for (p, area, uv) in points {
+            mesh.positions.push(p);
+            samples.push((p, area));
+            parameters.push(uv);
+        }
+        let at = |i: usize, j: usize| VertexId::new(first + i + j * (cells[0] + 1));
+        for j in 0..cells[1] {
+            for i in 0..cells[0] {
+                mesh.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                mesh.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+                patch_of_face.extend([patch as u32; 2]);
+            }
+        }
+    }
+    let triangulation = mesh.clone();
+    let refine = move |p: DVec3, nearest: &NearestPoint| {
+        let face = nearest.face.index();
+        let patch = &surface.patches[patch_of_face[face] as usize];
+        let [a, b, c] = triangulation.triangles[face].map(VertexId::index);
+        let weights = barycentric(triangulation.corners(nearest.face), nearest.point);
+        let start = [0, 1].map(|k| {
+            weights[0] * parameters[a][k] + weights[1] * parameters[b][k] + weights[2] * parameters[c][k]
+        });
+        distance(patch, p, start)
+    };
+    Surface::of_samples(&mesh, samples, Box::new(refine))
+}
+
+fn grid(patch: &Patch, spacing: f64) -> Grid {
+    let (width, height) = (patch.basis_u.len(), patch.basis_v.len());
+    // The control polygon is never shorter than the curve.
+    let longest = |lines: usize, points: usize, step: usize, stride: usize| {
+        let line = |l: usize| -> f64 {
+            let at = |k: usize| patch.control[l * stride + k * step];
+            (1..points).map(|k| at(k - 1).distance(at(k))).sum()
+        };
+        (0..lines).map(line).fold(0.0, f64::max)
+    };
+    let cells = [longest(height, width, 1, width), longest(width, height, width, 1)].map(|length| {
+        let count = (length / spacing).ceil();
+        // Not a number where the spacing is 0: then the fewest.
+        if count.is_finite() { (count as usize).clamp(*CELLS.start(), *CELLS.end()) } else { *CELLS.start() }
+    });
+    let mut points = Vec::with_capacity((cells[0] + 1) * (cells[1] + 1));
+    for j in 0..=cells[1] {
+        for i in 0..=cells[0] {
+            let uv = [i as f64 / cells[0] as f64, j as f64 / cells[1] as f64];
+            let s = patch.evaluate(uv[0], uv[1]);
+            // The trapezoidal rule: points on a side stand for half a cell.
+            let share = |k: usize, n: usize| if k == 0 || k == n { 0.5 } else { 1.0 } / n as f64;
+            let area = s.du.cross(s.dv).length() * share(i, cells[0]) * share(j, cells[1]);
+            points.push((s.position, area, uv));
+        }
+    }
+    Grid { points, cells }
+}
+
+fn barycentric([a, b, c]: [DVec3; 3], p: DVec3) -> [f64; 3] {
+    let normal = (b - a).cross(c - a);
+    let area = normal.length_squared();
+    if area == 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let w1 = (p - a).cross(c - a).dot(normal) / area;
+    let w2 = (b - a).cross(p - a).dot(normal) / area;
+    [1.0 - w1 - w2, w1, w2]
+}
+
+/// The distance from `p` to the patch near the given parameters.
+fn distance(patch: &Patch, p: DVec3, [mut u, mut v]: [f64; 2]) -> f64 {
+    let mut s = patch.evaluate(u, v);
+    let mut best = s.position.distance(p);
+    for _ in 0..STEPS {
+        let r = p - s.position;
+        let (a, b, c) = (s.du.length_squared(), s.du.dot(s.dv), s.dv.length_squared());
+        let (f, g) = (s.du.dot(r), s.dv.dot(r));
+        let determinant = a * c - b * b;
+        if determinant <= 1e-12 * a * c {
+            break;
+        }
+        let (mut du, mut dv) = ((c * f - b * g) / determinant, (a * g - b * f) / determinant);
+        // On a side of the patch, slide along it.
+        if (u <= 0.0 && du < 0.0) || (u >= 1.0 && du > 0.0) {
+            (du, dv) = (0.0, g / c);
+        } else if (v <= 0.0 && dv < 0.0) || (v >= 1.0 && dv > 0.0) {
+            (du, dv) = (f / a, 0.0);
+        }
+        (u, v) = ((u + du).clamp(0.0, 1.0), (v + dv).clamp(0.0, 1.0));
+        s = patch.evaluate(u, v);
+        let distance = s.position.distance(p);
+        if distance >= best {
+            break;
+        }
+        best = distance;
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use topipe_spline_fit::{Basis, PatchSide};
+
+    #[test]
+    fn points_off_a_curved_patch_find_their_foot() {
+        let basis = Basis::uniform(3, 2).unwrap();
+        let n = basis.len();
+        let control = (0..n * n)
+            .map(|k| {
+                let (i, j) = ((k % n) as f64, (k / n) as f64);
+                DVec3::new(i, j, (0.9 * i).sin() + 0.3 * j * j)
+            })
+            .collect();
+        let sides = [PatchSide { edge: 0, reversed: false }; 4];
+        let patch = Patch { sides, basis_u: basis.clone(), basis_v: basis, control };
+        let surface = SplineSurface { vertices: Vec::new(), edges: Vec::new(), patches: vec![patch] };
+        let sampled = sample(&surface, 0.5);
+        let mut chords = 0.0f64;
+        for k in 0..50 {
+            let (u, v) = ((f64::from(k) * 0.618).fract(), (f64::from(k) * 0.414).fract());
+            let s = surface.patches[0].evaluate(u, v);
+            for offset in [0.0, 0.05, -0.05] {
+                let p = s.position + s.normal() * offset;
+                let nearest = sampled.index.nearest(p).unwrap();
+                let found = sampled.distance(p);
+                assert!((found - offset.abs()).abs() < 1e-8, "{found} for {offset} at ({u}, {v})");
+                chords = chords.max((nearest.distance - offset.abs()).abs());
+            }
+        }
+        assert!(chords > 1e-4, "the triangulation alone is not enough: {chords}");
+    }
+}
