@@ -1,0 +1,265 @@
+//! The results as their users see them: opened with OpenCASCADE, gmsh and trimesh.
+//!
+//! The checkers in `tests/clients/` run in a virtual environment that this test makes itself under `target/clients`.
+//! Where it can not be made, the tests print SKIPPED and the reason; with TOPIPE_REQUIRE_CLIENTS=1 they fail.
+//! TOPIPE_CLIENTS_PYTHON names an interpreter that has the packages already.
+
+use serde_json::Value;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The interpreter with the packages, or the reason why there is none.
+fn python() -> &'static Result<PathBuf, String> {
+    static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    PYTHON.get_or_init(|| match std::env::var_os("TOPIPE_CLIENTS_PYTHON") {
+        Some(python) => {
+            let python = PathBuf::from(python);
+            import_packages(&python).map(|()| python)
+        }
+        None => make_environment(),
+    })
+}
+
+/// Runs a command; the end of what it says is the error.
+fn run(command: &mut Command) -> Result<String, String> {
+    let shown = format!("{command:?}");
+    let output = command.output().map_err(|e| format!("{shown}: {e}"))?;
+    if output.status.success() {
+        return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
+    }
+    let said = [output.stdout, output.stderr].map(|s| String::from_utf8_lossy(&s).trim().to_owned()).concat();
+    let tail: Vec<&str> = said.lines().rev().take(8).collect();
+    Err(format!("{shown}: {}\n{}", output.status, tail.into_iter().rev().collect::<Vec<_>>().join("\n")))
+}
+
+fn import_packages(python: &Path) -> Result<(), String> {
+    let imports = "import OCP.STEPControl, gmsh, trimesh, scipy, rtree, networkx";
+    run(Command::new(python).args(["-c", imports])).map(|_| ())
+}
+
+fn make_environment() -> Result<PathBuf, String> {
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().ok_or("no target directory")?;
+    let place = target.join("clients");
+    let python = place.join("bin/python");
+    let wanted_file = root().join("tests/clients/requirements.txt");
+    let wanted = fs::read_to_string(&wanted_file).map_err(|e| e.to_string())?;
+    fs::create_dir_all(target).map_err(|e| e.to_string())?;
+    // Two runs at once must not make it at once; the lock ends with the file handle.
+    let lock = File::create(target.join("clients.lock")).map_err(|e| e.to_string())?;
+    lock.lock().map_err(|e| e.to_string())?;
+    // Written last: an environment without it is half made, or of other packages.
+    let stamp = place.join("topipe-requirements.txt");
+    if fs::read_to_string(&stamp).is_ok_and(|made| made == wanted) && import_packages(&python).is_ok() {
+        return Ok(python);
+    }
+    if place.exists() {
+        fs::remove_dir_all(&place).map_err(|e| e.to_string())?;
+    }
+    run(Command::new("python3").args(["-m", "venv"]).arg(&place))?;
+    let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement"];
+    run(Command::new(&python).args(install).arg(&wanted_file))?;
+    import_packages(&python)?;
+    fs::write(&stamp, wanted).map_err(|e| e.to_string())?;
+    Ok(python)
+}
+
+/// The interpreter, or `None` after saying why not.
+fn clients() -> Option<&'static Path> {
+    match python() {
+        Ok(python) => Some(python),
+        Err(reason) => {
+            let required = std::env::var_os("TOPIPE_REQUIRE_CLIENTS").is_some_and(|v| v == "1");
+            assert!(!required, "TOPIPE_REQUIRE_CLIENTS=1, but the clients can not be installed:\n{reason}");
+            println!("SKIPPED: {reason}");
+            None
+        }
+    }
+}
+
+/// Runs a checker and returns what it found. Its exit status repeats what is asserted on the figures.
+fn check(python: &Path, tool: &str, arguments: &[&str], folder: &Path) -> Value {
+    let tool = root().join("tests/clients").join(tool);
+    let output = Command::new(python).arg(&tool).args(arguments).current_dir(folder).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    // gmsh may greet before the object.
+    let start = text.find('{').unwrap_or(0);
+    serde_json::from_str(&text[start..]).unwrap_or_else(|e| {
+        panic!(
+            "{} printed no JSON ({e}):\n{text}\n{}",
+            tool.display(),
+            String::from_utf8_lossy(&output.stderr)
+        )
+    })
+}
+
+fn number(value: &Value, path: &str) -> f64 {
+    value.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("no number at {path} in {value:#}"))
+}
+
+fn close(what: &str, value: f64, expected: f64, tolerance: f64) {
+    assert!(
+        (value - expected).abs() <= tolerance,
+        "{what}: {value}, but {expected} is expected (+-{tolerance})"
+    );
+}
+
+/// Runs the whole pipeline on a fixture. The folder holds part.stl, smooth.stl, smooth.off, part.step, report.json
+/// and, where wanted, skeleton.json.
+fn run_pipeline(case: &str, skeleton: bool) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let fixture = root().join("fixtures").join(case).canonicalize().unwrap();
+    let toml_path = |name: String| toml::Value::String(fixture.join(name).display().to_string()).to_string();
+    let (mesh, labels) = (toml_path(format!("{case}.stl")), toml_path(format!("{case}.labels.csv")));
+    let mut spec = format!(
+        "name = \"{case}\"\n\
+         [stage.mesh]\nkind = \"import\"\npath = {mesh}\nlabels = {labels}\n\
+         [stage.smooth]\nkind = \"smoothing\"\ninput = \"mesh\"\n\
+         [stage.tiles]\nkind = \"tiling\"\ninput = \"smooth\"\n\
+         [stage.quads]\nkind = \"quad-matching\"\ninput = \"tiles\"\n\
+         [stage.surface]\nkind = \"spline-fit\"\ninput = \"quads\"\n\
+         [stage.check]\nkind = \"validation\"\noriginal = \"mesh\"\nmesh = \"smooth\"\nlayout = \"quads\"\n\
+         surface = \"surface\"\n"
+    );
+    if skeleton {
+        spec += "skeleton = \"frame\"\n[stage.frame]\nkind = \"skeleton\"\ninput = \"smooth\"\n";
+    }
+    spec += "[export]\n\"part.stl\" = \"mesh\"\n\"smooth.stl\" = \"smooth\"\n\"smooth.off\" = \"smooth\"\n\
+             \"part.step\" = \"surface\"\n\"report.json\" = \"check\"\n";
+    if skeleton {
+        spec += "\"skeleton.json\" = \"frame\"\n";
+    }
+    let file = folder.path().join("pipeline.toml");
+    fs::write(&file, spec).unwrap();
+    run(Command::new(env!("CARGO_BIN_EXE_topipe"))
+        .args(["run", "-q"])
+        .arg(&file)
+        .arg("--out")
+        .arg(folder.path())
+        .arg("--cache")
+        .arg(folder.path().join("cache")))
+    .unwrap();
+    folder
+}
+
+fn report(folder: &Path) -> Value {
+    serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
+}
+
+/// The STEP file is one solid, exactly as the report says, and gmsh meshes it at four sizes.
+fn check_solid(python: &Path, folder: &Path, sizes: [f64; 4]) {
+    let report = report(folder);
+    let sizes = sizes.map(|h| h.to_string()).join(",");
+    let solid =
+        check(python, "check_step.py", &["part.step", "--reference", "smooth.stl", "--gmsh", &sizes], folder);
+    println!("{solid:#}");
+    assert_eq!(solid["solids"], 1);
+    assert_eq!(solid["closed"], true);
+    assert_eq!(solid["valid"], true);
+    assert!(number(&solid, "/max_tolerance_mm") <= 1e-6, "tolerance");
+    assert!(number(&solid, "/volume_mm3") > 0.0);
+    assert!(number(&solid, "/gap_mm") <= 1e-6, "gap");
+    close("genus", number(&solid, "/genus"), number(&report, "/original/genus"), 0.0);
+    close("volume against the mesh", number(&solid, "/reference/volume_error"), 0.0, 0.005);
+    for side in ["cad_to_mesh", "mesh_to_cad"] {
+        let mean = number(&solid, &format!("/reference/{side}/mean_rel"));
+        assert!(mean <= 5.2e-4, "mean deviation, {side}: {mean}");
+    }
+    let meshes = solid["gmsh"].as_array().unwrap();
+    assert_eq!(meshes.len(), 4);
+    for mesh in meshes {
+        assert!(mesh.get("error").is_none() && number(mesh, "/triangles") > 0.0, "{mesh}");
+    }
+
+    // Two implementations that share nothing agree on what the solid is.
+    let (volume, ours) = (number(&solid, "/volume_mm3"), number(&report, "/surface/volume_mm3"));
+    close("our volume over OpenCASCADE's", ours / volume, 1.0, 1e-6);
+    close("patches", number(&report, "/surface/patches"), number(&solid, "/faces"), 0.0);
+    close("genus of the surface", number(&report, "/surface/genus"), number(&solid, "/genus"), 0.0);
+    let both = ["cad_to_mesh", "mesh_to_cad"].map(|s| number(&solid, &format!("/reference/{s}/mean_mm")));
+    let mean = (both[0] + both[1]) / 2.0;
+    // Theirs is at random points and against chords of the diagonal / 2000.
+    let chord = number(&solid, "/bbox_diagonal_mm") / 2000.0;
+    close("mean deviation", number(&report, "/surface/deviation/mean_mm"), mean, 0.1 * mean + chord / 2.0);
+}
+
+/// The smoothed mesh is closed, keeps its volume and its holes.
+fn check_mesh(python: &Path, folder: &Path, case: &str) {
+    let facts = root().join("fixtures").join(case).join(format!("{case}.json"));
+    let (facts, report) = (facts.display().to_string(), report(folder));
+    let mesh =
+        check(python, "check_mesh.py", &["smooth.stl", "--reference", "part.stl", "--facts", &facts], folder);
+    println!("{mesh:#}");
+    assert_eq!(mesh["closed"], true);
+    assert_eq!(mesh["oriented"], true);
+    assert_eq!(mesh["genus"], number(&report, "/original/genus"));
+    // Coordinates of an STL file have 24 bits.
+    close("volume", number(&mesh, "/volume_error"), 0.0, 1e-6);
+    assert!(number(&report, "/smoothing/volume_error").abs() <= 1e-9);
+    close(
+        "volume in the report",
+        number(&report, "/smoothing/volume_mm3") / number(&mesh, "/volume_mm3"),
+        1.0,
+        1e-6,
+    );
+    assert_eq!(number(&report, "/smoothing/frozen_moved"), 0.0);
+
+    let ours = report["smoothing"]["holes"].as_array().unwrap();
+    for hole in mesh["holes"].as_array().unwrap() {
+        let nominal = number(hole, "/diameter_nominal");
+        close("diameter in the file", number(hole, "/diameter"), nominal, 1e-6 * nominal);
+        let found = ours.iter().any(|h| (number(h, "/diameter_after_mm") / nominal - 1.0).abs() <= 1e-6);
+        assert!(found, "no hole of diameter {nominal} in the report");
+    }
+    assert!(ours.len() >= mesh["holes"].as_array().unwrap().len());
+    for hole in ours {
+        let (before, after) = (number(hole, "/diameter_before_mm"), number(hole, "/diameter_after_mm"));
+        close("diameter after smoothing", after / before, 1.0, 1e-6);
+    }
+}
+
+#[test]
+fn the_bracket_opens_as_a_solid_with_its_holes() {
+    let Some(python) = clients() else { return };
+    let folder = run_pipeline("bracket", false);
+    check_mesh(python, folder.path(), "bracket");
+    check_solid(python, folder.path(), [12.0, 8.0, 5.0, 3.0]);
+}
+
+#[test]
+fn a_part_without_handles_opens_as_a_solid() {
+    let Some(python) = clients() else { return };
+    let folder = run_pipeline("y-form", false);
+    check_mesh(python, folder.path(), "y-form");
+    check_solid(python, folder.path(), [15.0, 10.0, 6.0, 4.0]);
+}
+
+#[test]
+fn the_skeleton_measures_the_same_with_both_rulers() {
+    let Some(python) = clients() else { return };
+    let folder = run_pipeline("cantilever", true);
+    let (folder, report) = (folder.path(), report(folder.path()));
+    check_mesh(python, folder, "cantilever");
+    let labels = root().join("fixtures/cantilever/cantilever.labels.csv").canonicalize().unwrap();
+    let labels = labels.display().to_string();
+    let theirs =
+        check(python, "check_skeleton.py", &["skeleton.json", "smooth.off", "--labels", &labels], folder);
+    println!("{theirs:#}");
+    let ours = &report["skeleton"];
+    for name in ["compactness", "out_of_object", "cycles", "components", "junctions", "free_ends"] {
+        close(name, number(ours, &format!("/{name}")), number(&theirs, &format!("/{name}")), 0.0);
+    }
+    close("genus", number(ours, "/genus"), number(&theirs, "/mesh_genus"), 0.0);
+    close("length", number(ours, "/length_mm") / number(&theirs, "/length_mm"), 1.0, 1e-9);
+    for name in ["e_center", "e_center_by_length"] {
+        let (ours, theirs) = (number(ours, &format!("/{name}")), number(&theirs, &format!("/{name}")));
+        // A ray that just misses or just meets a bump decides a point: they need not agree to the last digit.
+        close(name, ours / theirs, 1.0, 0.02);
+    }
+    assert_eq!(number(ours, "/out_of_object"), 0.0);
+}
