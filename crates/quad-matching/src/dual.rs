@@ -1,6 +1,6 @@
 //! The dual of a tiling, and the layout that its matching gives.
 
-use crate::matching::{Diagonal, perfect_matching, widest_corner};
+use crate::matching::{DOUBLET_PENALTY, Diagonal, perfect_matching, widest_corner};
 use crate::sides::{FeaturePath, TileSide, Tiled, feature_paths, midpoints, tile_sides};
 use crate::spokes::{self, SpokeTask};
 use crate::{MacroEdge, Parameters, QuadLayout, QuadMatchingError, Side};
@@ -33,8 +33,8 @@ pub fn match_quads(
     let triangles = macro_triangles(&tiled, &sides)?;
     let edge_of: BTreeMap<[u32; 2], u32> =
         edges.iter().enumerate().map(|(i, e)| (e.ends, i as u32)).collect();
-    let diagonals = diagonals(&tiled, &sites, &edges, &triangles, &edge_of)?;
-    let partner = perfect_matching(triangles.len(), &diagonals, parameters);
+    let mut diagonals = diagonals(&tiled, &sites, &edges, &triangles, &edge_of)?;
+    let partner = match_without_doublets(sites.len(), triangles.len(), &edges, &mut diagonals, parameters);
     let single = partner.iter().filter(|p| p.is_none()).count();
     if single > 0 {
         return Err(QuadMatchingError::NoPerfectMatching { single, all: triangles.len() });
@@ -108,6 +108,53 @@ fn rotated_to(triangle: &MacroTriangle, edge: [u32; 2]) -> [u32; 3] {
     } else {
         [c, a, b]
     }
+}
+
+/// Rounds in which edges whose removal makes a doublet are penalized; the nine reference parts have none left after
+/// at most eight.
+const DOUBLET_ROUNDS: usize = 3;
+
+/// Matches, and matches again with the edges penalized that were removed at sites left with two quads. Doublets
+/// that remain are merged later, which makes bigger quads.
+fn match_without_doublets(
+    sites: usize,
+    triangles: usize,
+    edges: &[MacroEdge],
+    diagonals: &mut [Diagonal],
+    parameters: &Parameters,
+) -> Vec<Option<usize>> {
+    let mut degree = vec![0u32; sites];
+    edges.iter().flat_map(|e| e.ends).for_each(|site| degree[site as usize] += 1);
+    // A site with three neighbours becomes a doublet as soon as one of its edges goes.
+    for (edge, diagonal) in edges.iter().zip(diagonals.iter_mut()) {
+        if edge.ends.iter().any(|&site| degree[site as usize] == 3) {
+            diagonal.penalty = DOUBLET_PENALTY;
+        }
+    }
+    let mut best: Option<(usize, Vec<Option<usize>>)> = None;
+    for _ in 0..DOUBLET_ROUNDS {
+        let partner = perfect_matching(triangles, diagonals, parameters);
+        let mut removed: Vec<usize> = partner.iter().flatten().copied().collect();
+        removed.sort_unstable();
+        removed.dedup();
+        let mut valence = degree.clone();
+        for &i in &removed {
+            edges[i].ends.iter().for_each(|&site| valence[site as usize] -= 1);
+        }
+        let doublets = valence.iter().filter(|&&v| v == 2).count();
+        if best.as_ref().is_none_or(|(fewest, _)| doublets < *fewest) {
+            best = Some((doublets, partner));
+        }
+        if doublets == 0 {
+            break;
+        }
+        for &i in &removed {
+            if edges[i].ends.iter().any(|&site| valence[site as usize] == 2) {
+                diagonals[i].penalty += DOUBLET_PENALTY;
+            }
+        }
+    }
+    best.map(|(_, partner)| partner).unwrap_or_default()
 }
 
 type Cuts = (Vec<VertexId>, Vec<MacroEdge>);
@@ -234,6 +281,7 @@ fn diagonals(
                 triangles: [t1, t2],
                 corners: [at(o1), at(d1), at(d2), at(o2)],
                 feature: edge.feature.is_some(),
+                penalty: 0.0,
             })
         })
         .collect()

@@ -18,10 +18,14 @@ pub(crate) struct Diagonal {
     /// Apexes and ends of the diagonal: o1, d1, d2, o2 with triangles (o1, d1, d2) and (o2, d2, d1).
     pub(crate) corners: [DVec3; 4],
     pub(crate) feature: bool,
+    /// Added to the weight: removing this edge helped to make a doublet.
+    pub(crate) penalty: f64,
 }
 
 /// As much as a corner of 178 degrees: quads across features are taken only when nothing else is left.
 const FEATURE_PENALTY: f64 = 1e5;
+/// As much as a corner of 172 degrees, for each round in which removing an edge left a doublet.
+pub(crate) const DOUBLET_PENALTY: f64 = 3e4;
 /// Weights are integers; a thousandth of the harmonic energy (8 for a square) is resolved.
 const RESOLUTION: f64 = 1e3;
 /// The highest weight: sums over a million triangles stay far inside the integers of the matching.
@@ -50,7 +54,8 @@ pub(crate) fn widest_corner([o1, d1, d2, o2]: [DVec3; 4]) -> f64 {
 fn weight(diagonal: &Diagonal, parameters: &Parameters) -> i128 {
     let wide = widest_corner(diagonal.corners).to_degrees();
     let mut weight =
-        harmonic_energy(diagonal.corners) + ((wide - parameters.soft_corner_angle) / 5.0).min(100.0).exp();
+        harmonic_energy(diagonal.corners) + ((wide - parameters.soft_corner_angle) / 5.0).min(12.0).exp();
+    weight += diagonal.penalty;
     if diagonal.feature {
         weight += FEATURE_PENALTY;
     }
@@ -161,7 +166,12 @@ mod tests {
                 for i in 0..n {
                     for pair in [[i, (i + 1) % n], [n + i, n + (i + 1) % n], [i, n + i]] {
                         let corners = [0; 4].map(|_| DVec3::new(random(), random(), random()));
-                        diagonals.push(Diagonal { triangles: pair, corners, feature: random() < 0.2 });
+                        diagonals.push(Diagonal {
+                            triangles: pair,
+                            corners,
+                            feature: random() < 0.2,
+                            penalty: 0.0,
+                        });
                     }
                 }
                 let count = 2 * n as usize;

@@ -1,9 +1,32 @@
-//! Tensor-product B-spline surfaces over a quadrilateral layout.
+//! Tensor-product B-spline surfaces over a quadrilateral layout, and their STEP files.
 //!
-//! Source: Beccari, Ceruti, Chudy 2025, *From Topological Optimization to Spline Layouts*, section 2.3.
+//! Source: Beccari, Ceruti, Chudy 2025, *From Topological Optimization to Spline Layouts*, section 2.3, after Mosbach
+//! et al. 2022, *A Local Approach for Computing Smooth B-Spline Surfaces for Arbitrary Quadrilateral Base Meshes*.
+//!
+//! Guarantees: each quad gives one patch; control points on shared edges are equal bit for bit, so the surface is
+//! watertight; the result does not depend on the number of threads. A part scaled by a power of two gives the same
+//! control points, scaled.
+//!
+//! Not guaranteed: tangent continuity across edges (C0 as in the source), a bound on the deviation, or that patches
+//! of quads with corners near 180 degrees are regular.
 
 pub mod basis;
+mod cholesky;
+mod energy;
+mod error;
+mod fit;
+mod foot_points;
+mod parameters;
+mod samples;
+mod shells;
+pub mod step;
 mod surface;
+mod tessellate;
+mod unknowns;
 
 pub use basis::Basis;
+pub use error::SplineFitError;
+pub use fit::fit;
+pub use parameters::Parameters;
+pub use shells::{Shell, shells};
 pub use surface::{EdgeCurve, Patch, PatchSide, SplineSurface, SurfacePoint};

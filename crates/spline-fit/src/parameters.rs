@@ -1,0 +1,68 @@
+//! What a user may set.
+
+use crate::{Basis, SplineFitError};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the fit; all are dimensionless.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Parameters {
+    /// Polynomial degree in both directions, 2 to 7.
+    pub degree: u32,
+    /// Interior knots in both directions, each in (0, 1), in order (source, section 3: 1/3, 2/3).
+    pub interior_knots: Vec<f64>,
+    /// Weight of the distance to the mesh against the bending energy, in (0, 1] (source, section 2.3).
+    pub lambda: f64,
+    /// Rounds in which the parameters of the mesh points are moved to the foot points on the last fit.
+    pub foot_point_rounds: u32,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            degree: 3,
+            interior_knots: vec![1.0 / 3.0, 2.0 / 3.0],
+            lambda: 1.0 - 1e-6,
+            foot_point_rounds: 2,
+        }
+    }
+}
+
+impl Parameters {
+    /// Checks the ranges; returns the basis they describe.
+    pub fn basis(&self) -> Result<Basis, SplineFitError> {
+        let refuse = |field, value: String, range| Err(SplineFitError::Parameter { field, value, range });
+        if !(2..=7).contains(&self.degree) {
+            return refuse("degree", self.degree.to_string(), "2 to 7");
+        }
+        if !(self.lambda > 0.0 && self.lambda <= 1.0) {
+            return refuse("lambda", self.lambda.to_string(), "greater than 0, at most 1");
+        }
+        if self.foot_point_rounds > 20 {
+            return refuse("foot_point_rounds", self.foot_point_rounds.to_string(), "0 to 20");
+        }
+        if self.interior_knots.len() > 64 {
+            return refuse(
+                "interior_knots",
+                format!("{} knots", self.interior_knots.len()),
+                "at most 64 knots",
+            );
+        }
+        let n = self.interior_knots.len();
+        let symmetric =
+            (0..n).all(|k| (self.interior_knots[k] + self.interior_knots[n - 1 - k] - 1.0).abs() < 1e-12);
+        if !symmetric {
+            // Two patches may run along their common edge in opposite directions.
+            return refuse("interior_knots", format!("{:?}", self.interior_knots), "symmetric about 1/2");
+        }
+        match Basis::clamped(self.degree as usize, &self.interior_knots) {
+            Some(basis) => Ok(basis),
+            None => refuse(
+                "interior_knots",
+                format!("{:?}", self.interior_knots),
+                "weakly increasing, inside (0, 1), none more often than the degree",
+            ),
+        }
+    }
+}
