@@ -51,7 +51,7 @@ impl DiskMap {
         for row in &mut rows {
             let largest = row.iter().map(|e| e.1).filter(|w| w.is_finite()).fold(0.0, f64::max);
             for entry in row.iter_mut() {
-                if !(entry.1 > 1e-12 * largest) {
+                if entry.1.is_nan() || entry.1 <= 1e-12 * largest {
                     entry.1 = if entry.1.is_finite() { 1e-12 * largest } else { largest.max(1.0) };
                 }
                 if largest == 0.0 {

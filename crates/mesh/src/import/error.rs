@@ -35,7 +35,9 @@ pub enum ImportError {
         file: String,
     },
     /// The file ends too early.
-    #[error("{file}: the file is cut off: {expected} announced, {found} present; copy or export it again")]
+    #[error(
+        "{file}: the file is cut off: {expected} should be there, but only {found}; copy or export it again"
+    )]
     Truncated {
         /// The file.
         file: String,
@@ -90,7 +92,7 @@ pub enum ImportError {
     #[error(
         "{file}: the surface is not closed: {}; the longest, {} edges and {length:.4} long, passes {} beside face {face}; \
          close the holes in the program that made the mesh{}",
-        count_borders(*.borders), .edges, at(.point), if *.slit { "; the two sides of this border lie on each other; if its vertices nearly coincide, weld_tolerance closes it" } else { "" }
+        count_borders(*.borders), .edges, at(.point), if *.slit { "; nothing is missing there, but its two sides do not share their vertices; where these nearly coincide, weld_tolerance helps" } else { "" }
     )]
     Open {
         /// The file.
@@ -105,7 +107,7 @@ pub enum ImportError {
         point: DVec3,
         /// A face beside that point.
         face: u32,
-        /// Whether the longest border encloses next to nothing, as where vertices fail to meet.
+        /// Whether the sides of the longest border lie on each other, as where vertices fail to meet.
         slit: bool,
     },
     /// An edge with an odd number of faces, or one around which inside and outside can not be told apart.

@@ -1,7 +1,7 @@
 //! Wavefront OBJ: `v` and `f` lines; normals, texture coordinates, groups and materials are ignored.
 
 use super::ImportError;
-use super::soup::{Soup, excerpt, lines, number, words};
+use super::soup::{Soup, found, lines, number, words};
 use glam::DVec3;
 
 /// Reads the vertices and faces.
@@ -19,9 +19,8 @@ pub(super) fn parse(file: &str, text: &[u8]) -> Result<Soup, ImportError> {
                 let mut point = [0.0; 3];
                 for x in &mut point {
                     let word = words.next().unwrap_or_default();
-                    *x = number(word).ok_or_else(|| {
-                        malformed(format!("a number was expected, not \"{}\"", excerpt(word)))
-                    })?;
+                    *x = number(word)
+                        .ok_or_else(|| malformed(format!("a number was expected, not {}", found(word))))?;
                 }
                 positions.push(DVec3::from_array(point));
             }
@@ -36,7 +35,7 @@ pub(super) fn parse(file: &str, text: &[u8]) -> Result<Soup, ImportError> {
                         _ => -1,
                     };
                     let vertex = u32::try_from(vertex).map_err(|_| {
-                        malformed(format!("a vertex index was expected, not \"{}\"", excerpt(word)))
+                        malformed(format!("a vertex index was expected, not {}", found(word)))
                     })?;
                     corners.push(vertex);
                 }

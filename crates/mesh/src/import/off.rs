@@ -1,7 +1,7 @@
 //! OFF, the Object File Format of Geomview: text, faces of any number of corners, colours and normals ignored.
 
 use super::ImportError;
-use super::soup::{Soup, excerpt, lines, number, words};
+use super::soup::{Soup, found, lines, number, words};
 use glam::DVec3;
 
 /// True for the header lines of OFF and its variants with colours, normals and texture coordinates.
@@ -26,10 +26,10 @@ pub(super) fn parse(file: &str, text: &[u8]) -> Result<Soup, ImportError> {
         .map(|(k, line)| (k, line.split(|&b| b == b'#').next().unwrap_or_default().trim_ascii()))
         .filter(|(_, line)| !line.is_empty())
         .peekable();
-    let cut_off = |expected: String, found: usize, what: &str| ImportError::Truncated {
+    let cut_off = |expected: String, present: usize, what: &str| ImportError::Truncated {
         file: file.to_owned(),
         expected,
-        found: format!("{found} {what}"),
+        found: format!("{present} {what}"),
     };
 
     // The counts stand behind the header word or in the next line; some files have no header word.
@@ -47,7 +47,7 @@ pub(super) fn parse(file: &str, text: &[u8]) -> Result<Soup, ImportError> {
         std::str::from_utf8(w)
             .ok()
             .and_then(|w| w.parse::<usize>().ok())
-            .ok_or_else(|| malformed(line, format!("a count was expected, not \"{}\"", excerpt(w))))
+            .ok_or_else(|| malformed(line, format!("a count was expected, not {}", found(w))))
     });
     let mut count = || counts.next().unwrap_or_else(|| Err(malformed(line, "a count is missing".to_owned())));
     let (vertices, faces) = (count()?, count()?);
@@ -67,9 +67,8 @@ pub(super) fn parse(file: &str, text: &[u8]) -> Result<Soup, ImportError> {
         let mut point = [0.0; 3];
         for x in &mut point {
             let word = words.next().unwrap_or_default();
-            *x = number(word).ok_or_else(|| {
-                malformed(line, format!("a number was expected, not \"{}\"", excerpt(word)))
-            })?;
+            *x = number(word)
+                .ok_or_else(|| malformed(line, format!("a number was expected, not {}", found(word))))?;
         }
         positions.push(DVec3::from_array(point));
     }
@@ -82,9 +81,10 @@ pub(super) fn parse(file: &str, text: &[u8]) -> Result<Soup, ImportError> {
         let mut indices = words(content);
         let mut index = || {
             let word = indices.next().unwrap_or_default();
-            std::str::from_utf8(word).ok().and_then(|w| w.parse::<u32>().ok()).ok_or_else(|| {
-                malformed(line, format!("a vertex index was expected, not \"{}\"", excerpt(word)))
-            })
+            std::str::from_utf8(word)
+                .ok()
+                .and_then(|w| w.parse::<u32>().ok())
+                .ok_or_else(|| malformed(line, format!("a vertex index was expected, not {}", found(word))))
         };
         for _ in 0..index()? {
             corners.push(index()?);

@@ -79,7 +79,12 @@ pub(super) fn parse(file: &str, bytes: &[u8]) -> Result<Soup, ImportError> {
     let malformed = |e: ply_rs_bw::parser::ParseError| ImportError::Malformed {
         file: file.to_owned(),
         place: e.line().map_or("PLY".to_owned(), |line| format!("line {line}")),
-        problem: e.to_string(),
+        problem: {
+            // The line stands in `place`; the message itself may have several lines.
+            let message = e.to_string();
+            let words = message.split_whitespace().skip(if e.line().is_some() { 2 } else { 0 });
+            words.collect::<Vec<_>>().join(" ")
+        },
     };
     let mut reader = Reader::new(bytes);
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(malformed)?;

@@ -139,6 +139,11 @@ pub(super) fn number(word: &[u8]) -> Option<f64> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
+/// What stands in the place of something expected.
+pub(super) fn found(word: &[u8]) -> String {
+    if word.is_empty() { "the end of the line".to_owned() } else { format!("\"{}\"", excerpt(word)) }
+}
+
 /// A piece of the file for a message: short, printable.
 pub(super) fn excerpt(word: &[u8]) -> String {
     String::from_utf8_lossy(word)

@@ -5,7 +5,7 @@
 //! at upper case and at a byte order mark, and rounds to 32 bits.
 
 use super::ImportError;
-use super::soup::{Soup, excerpt, lines, number, words};
+use super::soup::{Soup, excerpt, found, lines, number, words};
 use glam::DVec3;
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -44,6 +44,10 @@ pub(super) fn parse_binary(file: &str, bytes: &[u8]) -> Result<Soup, ImportError
         });
     };
     if body / RECORD < count {
+        // Less than 2^24 faces leave a zero byte there, which no text has.
+        if bytes[..HEADER + 4].iter().all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace()) {
+            return Err(ImportError::UnknownFormat { file: file.to_owned() });
+        }
         return Err(ImportError::Truncated {
             file: file.to_owned(),
             expected: format!("{count} faces"),
@@ -73,10 +77,15 @@ pub(super) fn parse_binary(file: &str, bytes: &[u8]) -> Result<Soup, ImportError
 /// Reads an ASCII file with any case, names and number of solids, with or without normals.
 pub(super) fn parse_ascii(file: &str, text: &[u8]) -> Result<Soup, ImportError> {
     let mut soup = Soup { format: "STL (ASCII)", unindexed: true, ..Soup::default() };
-    let malformed = |line: usize, problem: String| ImportError::Malformed {
-        file: file.to_owned(),
-        place: format!("line {line}"),
-        problem,
+    let last_line = 1 + text.trim_ascii_end().iter().filter(|&&b| b == b'\n').count();
+    let malformed = |line: usize, problem: String| match line {
+        // A last line that makes no sense is the stump of one.
+        line if line == last_line => ImportError::Truncated {
+            file: file.to_owned(),
+            expected: "the end of the solid".to_owned(),
+            found: format!("a broken line {line}"),
+        },
+        line => ImportError::Malformed { file: file.to_owned(), place: format!("line {line}"), problem },
     };
     // The line a facet started at, and where its points start.
     let mut facet: Option<(usize, usize)> = None;
@@ -93,9 +102,8 @@ pub(super) fn parse_ascii(file: &str, text: &[u8]) -> Result<Soup, ImportError> 
             let mut point = [0.0; 3];
             for x in &mut point {
                 let word = words.next().unwrap_or_default();
-                *x = number(word).ok_or_else(|| {
-                    malformed(line, format!("a number was expected, not \"{}\"", excerpt(word)))
-                })?;
+                *x = number(word)
+                    .ok_or_else(|| malformed(line, format!("a number was expected, not {}", found(word))))?;
             }
             soup.positions.push(DVec3::from_array(point));
         } else if is("facet") {
