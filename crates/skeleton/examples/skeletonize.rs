@@ -1,10 +1,11 @@
-//! Skeletonizes an OFF file: `skeletonize MESH.off LABELS.csv|- METHOD [SMOOTHED.off] > skeleton.json`.
+//! Skeletonizes a mesh: `skeletonize MESH LABELS.csv|- METHOD [SMOOTHED.off] > skeleton.json`.
 //!
 //! With a fourth argument the mesh is first smoothed as in the thesis (10 Taubin iterations, then 5 of contraction)
 //! and written there.
 
 use std::process::ExitCode;
-use topipe_mesh::{Design, Part, TriangleMesh};
+use topipe_mesh::TriangleMesh;
+use topipe_mesh::import::{ImportOptions, Source, read_source};
 use topipe_progress::Progress;
 use topipe_skeleton::{Method, Parameters, skeletonize};
 
@@ -14,9 +15,7 @@ fn main() -> ExitCode {
         [mesh, labels, method] => (mesh, labels, method, None),
         [mesh, labels, method, smoothed] => (mesh, labels, method, Some(smoothed.as_str())),
         _ => {
-            eprintln!(
-                "usage: skeletonize MESH.off LABELS.csv|- identifier-box|marching-sections [SMOOTHED.off]"
-            );
+            eprintln!("usage: skeletonize MESH LABELS.csv|- identifier-box|marching-sections [SMOOTHED.off]");
             return ExitCode::from(2);
         }
     };
@@ -30,15 +29,13 @@ fn main() -> ExitCode {
 }
 
 fn run(mesh: &str, labels: &str, method: &str, smoothed: Option<&str>) -> Result<(), String> {
-    let text = std::fs::read_to_string(mesh).map_err(|e| format!("{mesh}: {e}"))?;
-    let mut part = Part::new(read_off(&text).ok_or(format!("{mesh}: not an OFF file of triangles"))?);
-    if labels != "-" {
-        let text = std::fs::read_to_string(labels).map_err(|e| format!("{labels}: {e}"))?;
-        part.design = text
-            .split_whitespace()
-            .map(|l| if l == "1" { Design::NonDesign } else { Design::Design })
-            .collect();
-    }
+    let bytes = std::fs::read(mesh).map_err(|e| format!("{mesh}: {e}"))?;
+    let given =
+        if labels == "-" { None } else { Some(std::fs::read(labels).map_err(|e| format!("{labels}: {e}"))?) };
+    let source =
+        Source { labels: given.as_deref().map(|bytes| (labels, bytes)), ..Source::new(mesh, &bytes) };
+    let mut part =
+        read_source(&source, &ImportOptions::default(), &Progress::silent()).map_err(|e| e.to_string())?;
     if let Some(path) = smoothed {
         for (method, iterations) in
             [(topipe_smoothing::Method::Taubin, 10), (topipe_smoothing::Method::Contract, 5)]
@@ -68,24 +65,6 @@ fn run(mesh: &str, labels: &str, method: &str, smoothed: Option<&str>) -> Result
     }
     println!("{}", skeleton.to_json());
     Ok(())
-}
-
-fn read_off(text: &str) -> Option<TriangleMesh> {
-    let mut words = text.lines().filter(|l| !l.starts_with('#')).flat_map(str::split_whitespace);
-    (words.next()? == "OFF").then_some(())?;
-    let (vertices, faces): (usize, usize) = (words.next()?.parse().ok()?, words.next()?.parse().ok()?);
-    words.next()?;
-    let mut numbers = words.map(|w| w.parse::<f64>().ok());
-    let mut positions = Vec::new();
-    for _ in 0..vertices {
-        positions.push([numbers.next()??, numbers.next()??, numbers.next()??]);
-    }
-    let mut triangles = Vec::new();
-    for _ in 0..faces {
-        (numbers.next()?? == 3.0).then_some(())?;
-        triangles.push([numbers.next()?? as u32, numbers.next()?? as u32, numbers.next()?? as u32]);
-    }
-    Some(TriangleMesh::from_arrays(positions, triangles))
 }
 
 fn write_off(mesh: &TriangleMesh) -> String {

@@ -11,6 +11,11 @@ const WORKING_SPACING: f64 = 0.35;
 const ROUNDS: usize = 5;
 /// The running median is over this many sections: fillets widen slowly over more, junctions suddenly over fewer.
 const MEDIAN_WINDOW: usize = 5;
+/// The direction of an axis at its end is taken over so many sections, three radii.
+const STRAIGHT: usize = 8;
+/// A section this much larger than the median of those further in belongs to the fillet of a junction. On three bars
+/// of radius 1 the junction is 0.10 off with the fillets and 0.003 without.
+const SETTLED: f64 = 1.05;
 /// So many bad sections in a row (four radii) are a knot or a flaw of the surface; more are a junction.
 const FLAW: usize = 12;
 /// A section with a smaller share of its branch has run into another one.
@@ -93,18 +98,27 @@ impl Axis {
         if self.sections.len() < 2 {
             return None;
         }
-        let centroids: Vec<_> = self.sections.iter().map(|l| l.centroid).collect();
-        let direction = end_direction(&centroids, at_start);
-        let end = if at_start { centroids[0] } else { centroids[centroids.len() - 1] };
-        (direction != DVec3::ZERO).then_some((end, direction))
+        let inwards: Vec<_> =
+            if at_start { self.sections.iter().collect() } else { self.sections.iter().rev().collect() };
+        // The last sections before a junction already bend towards it: begin where the width has settled.
+        let settled = |k: &usize| {
+            let mut beyond: Vec<_> = inwards[k + 1..].iter().take(STRAIGHT).map(|l| l.area).collect();
+            beyond.sort_by(f64::total_cmp);
+            beyond.get(beyond.len() / 2).is_some_and(|median| inwards[*k].area <= SETTLED * median)
+        };
+        let most = inwards.len().saturating_sub(STRAIGHT / 2);
+        let begin = (0..most).find(settled).unwrap_or(0);
+        let centroids: Vec<_> = inwards[begin..].iter().map(|l| l.centroid).collect();
+        let direction = end_direction(&centroids, true);
+        (direction != DVec3::ZERO).then_some((centroids[0], direction))
     }
 }
 
-/// Direction outwards at one end of a line: from the middle of the last six points to the last three.
+/// Direction outwards at one end of a line: from the middle of the inner half of the last points to that of the outer.
 fn end_direction(points: &[DVec3], at_start: bool) -> DVec3 {
     let n = points.len();
     let at = |k: usize| if at_start { points[k] } else { points[n - 1 - k] };
-    let window = n.min(8);
+    let window = n.min(STRAIGHT);
     let half = window / 2;
     if half == 0 {
         return DVec3::ZERO;

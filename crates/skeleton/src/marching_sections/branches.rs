@@ -37,6 +37,8 @@ pub(super) struct Branch {
 #[derive(Debug, Clone)]
 pub(super) struct BranchGraph {
     pub(super) nodes: Vec<NodeKind>,
+    /// Where their critical vertices lie, on the surface.
+    places: Vec<DVec3>,
     pub(super) branches: Vec<Option<Branch>>,
 }
 
@@ -66,7 +68,8 @@ impl BranchGraph {
                 Some(Branch { ends: arc.ends.map(|n| n as usize), samples, vertices: arc.vertices.clone() })
             })
             .collect();
-        Self { nodes, branches }
+        let places = reeb.nodes.iter().map(|&v| piece.mesh.position(v)).collect();
+        Self { nodes, places, branches }
     }
 
     /// The branches at a node, each with the end it has there; a branch that returns to the node comes twice.
@@ -143,7 +146,9 @@ impl BranchGraph {
                     })
                     .collect();
                 let height = if near.is_empty() {
-                    0.0
+                    // Between saddles next to each other there is no level loop: the saddle itself must do.
+                    let radius = branch.samples.iter().map(|s| s.radius).fold(0.0, f64::max);
+                    if radius > 0.0 { tip.distance(self.places[foot]) / radius } else { 0.0 }
                 } else {
                     let axis = near.iter().map(|s| s.point).sum::<DVec3>() / near.len() as f64;
                     let radius = near.iter().map(|s| s.radius).fold(f64::MIN_POSITIVE, f64::max);
