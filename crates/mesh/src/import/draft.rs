@@ -69,21 +69,17 @@ impl Draft {
 /// Makes one vertex of those with equal coordinates, or that are nearer to each other than `tolerance`; drops the
 /// triangles that lose a corner by it, and vertices without faces.
 pub(super) fn weld(soup: Soup, tolerance: f64) -> Draft {
-    let Soup { unindexed, mut positions, triangles, face_of, repairs, .. } = soup;
+    let Soup { unindexed, positions, triangles, face_of, repairs, .. } = soup;
     let mut draft = Draft { repairs, ..Draft::default() };
-    for p in &mut positions {
-        // Minus zero and zero are the same place.
-        *p += DVec3::ZERO;
-    }
-    let exact = Welded::equal(&positions);
+    let equal = Welded::equal(&positions);
     if !unindexed {
         // In an STL every corner brings its own point: only for other formats are equal points a defect.
-        draft.note("welded vertices with equal coordinates", positions.len() - exact.first.len());
+        draft.note("welded vertices with equal coordinates", positions.len() - equal.first.len());
     }
-    let mut vertex_of = exact.of;
-    draft.mesh.positions = exact.first.iter().map(|&v| positions[v as usize]).collect();
-    draft.provenance = exact.first.iter().map(|&v| Provenance::Vertex(VertexId(v))).collect();
     drop(positions);
+    let mut vertex_of = equal.of;
+    draft.mesh.positions = equal.positions;
+    draft.provenance = equal.first.iter().map(|&v| Provenance::Vertex(VertexId(v))).collect();
     if tolerance > 0.0 {
         let near = nearer_than(&draft.mesh.positions, tolerance);
         let merged = near.iter().enumerate().filter(|&(v, &to)| to as usize != v).count();
@@ -114,57 +110,79 @@ struct Welded {
     of: Vec<u32>,
     /// The first point of each new vertex.
     first: Vec<u32>,
+    /// The position of each new vertex.
+    positions: Vec<DVec3>,
 }
 
 impl Welded {
-    /// Points with the same bits, numbered by first appearance: open addressing with linear probing.
-    fn equal(positions: &[DVec3]) -> Self {
-        const FREE: u32 = u32::MAX;
-        let mut table = vec![FREE; 1024];
-        let mut first: Vec<u32> = Vec::new();
-        let mut of = Vec::with_capacity(positions.len());
-        let slot_of = |p: DVec3, mask: usize| {
-            let mut hash = 0u64;
-            for x in p.to_array() {
-                // The finalizer of MurmurHash3: coordinates on a grid differ in few bits.
-                hash ^= x.to_bits();
-                hash = (hash ^ (hash >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd);
-                hash = (hash ^ (hash >> 33)).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
+    /// Points with the same coordinates, numbered by first appearance; minus zero and zero are the same.
+    ///
+    /// Open addressing with linear probing. An entry holds half of the hash beside the vertex, so that a position is
+    /// fetched only where it almost surely agrees. Neighbouring triangles of a file tend to stand near each other:
+    /// a small table of the vertices seen last answers most look-ups from the nearest cache.
+    fn equal(points: &[DVec3]) -> Self {
+        const FREE: u64 = u64::MAX;
+        const RECENT: usize = 1 << 12;
+        let mut welded =
+            Self { of: Vec::with_capacity(points.len()), first: Vec::new(), positions: Vec::new() };
+        // A closed triangle mesh has about half as many vertices as faces, a sixth of its corners.
+        let mut table = vec![FREE; (points.len() / 3).next_power_of_two().max(16)];
+        let mut recent = vec![FREE; RECENT];
+        for (k, &p) in points.iter().enumerate() {
+            let p = p + DVec3::ZERO;
+            let hash = hash(p);
+            let tag = hash >> 32;
+            let is_it = |entry: u64, positions: &[DVec3]| {
+                entry >> 32 == tag && positions.get(entry as u32 as usize) == Some(&p)
+            };
+            let seen = recent[hash as usize % RECENT];
+            if is_it(seen, &welded.positions) {
+                welded.of.push(seen as u32);
+                continue;
             }
-            (hash ^ (hash >> 33)) as usize & mask
-        };
-        for (k, &p) in positions.iter().enumerate() {
-            if 2 * first.len() >= table.len() {
-                table = vec![FREE; table.len() * 2];
-                let mask = table.len() - 1;
-                for (v, &f) in first.iter().enumerate() {
-                    let mut slot = slot_of(positions[f as usize], mask);
-                    while table[slot] != FREE {
-                        slot = (slot + 1) & mask;
-                    }
-                    table[slot] = v as u32;
+            let mut slot = hash as usize & (table.len() - 1);
+            let entry = loop {
+                let entry = table[slot];
+                if entry == FREE {
+                    let entry = tag << 32 | welded.positions.len() as u64;
+                    table[slot] = entry;
+                    welded.positions.push(p);
+                    welded.first.push(k as u32);
+                    break entry;
                 }
-            }
-            let mask = table.len() - 1;
-            let mut slot = slot_of(p, mask);
-            loop {
-                match table[slot] {
-                    FREE => {
-                        table[slot] = first.len() as u32;
-                        of.push(first.len() as u32);
-                        first.push(k as u32);
-                        break;
-                    }
-                    v if positions[first[v as usize] as usize] == p => {
-                        of.push(v);
-                        break;
-                    }
-                    _ => slot = (slot + 1) & mask,
+                if is_it(entry, &welded.positions) {
+                    break entry;
                 }
+                slot = (slot + 1) & (table.len() - 1);
+            };
+            recent[hash as usize % RECENT] = entry;
+            welded.of.push(entry as u32);
+            if 2 * welded.positions.len() > table.len() {
+                let mut larger = vec![FREE; 2 * table.len()];
+                for (v, &q) in welded.positions.iter().enumerate() {
+                    let hash = self::hash(q);
+                    let mut slot = hash as usize & (larger.len() - 1);
+                    while larger[slot] != FREE {
+                        slot = (slot + 1) & (larger.len() - 1);
+                    }
+                    larger[slot] = hash >> 32 << 32 | v as u64;
+                }
+                table = larger;
             }
         }
-        Self { of, first }
+        welded
     }
+}
+
+/// A hash of the bits of a point. Coordinates on a grid differ in few bits: the finalizer of MurmurHash3 spreads them.
+#[inline]
+fn hash(p: DVec3) -> u64 {
+    let mut h = p.x.to_bits().wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    h = h.rotate_left(23) ^ p.y.to_bits().wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
+    h = h.rotate_left(23) ^ p.z.to_bits().wrapping_mul(0x1656_67b1_9e37_79f9);
+    h = (h ^ (h >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd);
+    h = (h ^ (h >> 33)).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
+    h ^ (h >> 33)
 }
 
 /// For each point the earliest point that it is taken for: itself, or one within `tolerance` that stays.
