@@ -12,6 +12,9 @@
 //! - Each direction of each junction is tried once, each branch has a bounded number of boxes and there are at most
 //!   as many junctions as nodes, so the method ends on any mesh.
 //! - A later point closer than `l_b` to a point of another branch joins it, which the thesis asks of first points only.
+//! - "If this skeletal point lies within the design region": so must the way to it, tried in four places; otherwise
+//!   the branch ends before it.
+//! - A branch that joins another after one or two points is that branch once more, and goes.
 //! - A branch that reaches the nodes of an interface ends there.
 
 mod march;
@@ -39,6 +42,7 @@ struct Junction {
 struct State<'a> {
     parameters: &'a Parameters,
     scanner: Scanner<'a>,
+    inside: Inside,
     sets: &'a Sets,
     skeleton: Skeleton,
     junctions: Vec<Junction>,
@@ -59,6 +63,7 @@ pub(crate) fn skeletonize(
     let mut state = State {
         parameters,
         scanner: Scanner::new(part, connectivity),
+        inside: Inside::new(&part.mesh),
         sets,
         skeleton: Skeleton::new(Method::IdentifierBox),
         junctions: Vec::new(),
@@ -86,8 +91,8 @@ pub(crate) fn skeletonize(
         k += 1;
     }
     state.close();
-    let mut skeleton = state.skeleton;
-    non_design::join(&mut skeleton, part, connectivity, sets, &Inside::new(&part.mesh), &interface_points);
+    let State { mut skeleton, inside, .. } = state;
+    non_design::join(&mut skeleton, part, connectivity, sets, &inside, &interface_points);
     skeleton.finish();
     Ok(skeleton)
 }

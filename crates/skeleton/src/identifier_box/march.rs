@@ -35,6 +35,9 @@ impl State<'_> {
                 // Across a turn the widths are those of other axes.
                 previous = found.bounds;
             }
+            if !self.runs_inside(last, found.point) {
+                return;
+            }
             // An interface ahead.
             if let Some(k) = self.interface_in(&found, from)
                 && self.skeleton.points[k as usize].distance(found.point) < 2.0 * step
@@ -48,7 +51,8 @@ impl State<'_> {
                 close || junction.bounds.overlaps(&found.bounds)
             });
             if let Some(k) = hit.filter(|&k| Some(k) != origin || count > 3) {
-                if self.junctions[k].point != last {
+                let junction = self.skeleton.points[self.junctions[k].point as usize];
+                if self.junctions[k].point != last && self.runs_inside(last, junction) {
                     self.skeleton.add_edge(last, self.junctions[k].point);
                 }
                 self.update_junction(k, &found, direction.reversed());
@@ -63,7 +67,9 @@ impl State<'_> {
             if let Some((distance, p)) = near
                 && distance < step
             {
-                if count > 0 {
+                if self.skeleton.points.len() as u32 - first_own <= 2 {
+                    self.forget(first_own);
+                } else if self.runs_inside(last, self.skeleton.points[p]) {
                     self.skeleton.add_edge(last, p as u32);
                 }
                 return;
@@ -101,6 +107,21 @@ impl State<'_> {
             first_box = found.bounds;
             first_box.set_slab(direction, found.bounds.front(direction), step);
         }
+    }
+
+    /// True when the straight way from a point of the skeleton stays in the material.
+    fn runs_inside(&self, from: u32, to: DVec3) -> bool {
+        let start = self.skeleton.points[from as usize];
+        [0.25, 0.5, 0.75, 1.0].into_iter().all(|t| self.inside.contains(start.lerp(to, t)))
+    }
+
+    /// Takes back the points from `first` on, none of which is a junction.
+    fn forget(&mut self, first: u32) {
+        let skeleton = &mut self.skeleton;
+        skeleton.points.truncate(first as usize);
+        skeleton.kinds.truncate(first as usize);
+        skeleton.sections.truncate(first as usize);
+        skeleton.edges.retain(|e| e[1] < first);
     }
 
     /// Scans ahead; where that is vacant, in the four directions across (figure 3.24).

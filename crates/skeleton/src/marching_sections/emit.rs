@@ -231,7 +231,8 @@ fn between(sections: &[Loop], ends: [Place; 2], least: usize) -> &[Loop] {
 fn without_axis(branch: &Branch, ends: [Place; 2], least: usize, inside: &Inside) -> Vec<(DVec3, Section)> {
     // A handle of a few triangles may not even have those; its cycle is kept all the same.
     let mut line: Vec<_> = branch.samples.iter().map(|s| s.point).collect();
-    if line.len() < least {
+    let short = line.len() < least;
+    if short {
         line.insert(0, ends[0].at);
         line.push(ends[1].at);
     }
@@ -239,7 +240,11 @@ fn without_axis(branch: &Branch, ends: [Place; 2], least: usize, inside: &Inside
     let mut points = if length > 0.0 { resample(&line, length / 6.0) } else { vec![ends[0].at; least] };
     if points.len() > least {
         let n = points.len();
-        points = (0..least).map(|k| points[(k + 1) * n / (least + 1)]).collect();
+        // A short line may lead out and back the same way: points up to its middle differ.
+        let pick = |k: usize| {
+            if short { (k + 4).saturating_sub(least).min(n - 1) } else { (k + 1) * n / (least + 1) }
+        };
+        points = (0..least).map(|k| points[pick(k)]).collect();
     }
     points.into_iter().map(|p| (within(p, inside), Section::None)).collect()
 }
