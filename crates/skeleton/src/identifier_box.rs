@@ -12,7 +12,7 @@
 //! - Each direction of each junction is tried once, each branch has a bounded number of boxes and there are at most
 //!   as many junctions as nodes, so the method ends on any mesh.
 //! - A later point closer than `l_b` to a point of another branch joins it, which the thesis asks of first points only.
-//! - "If this skeletal point lies within the design region": so must the way to it, tried in four places; otherwise
+//! - "If this skeletal point lies within the design region": so must the middle of the way to it; otherwise
 //!   the branch ends before it.
 //! - A branch that joins another after one or two points is that branch once more, and goes.
 //! - A branch that reaches the nodes of an interface ends there.

@@ -112,7 +112,7 @@ impl State<'_> {
     /// True when the straight way from a point of the skeleton stays in the material.
     fn runs_inside(&self, from: u32, to: DVec3) -> bool {
         let start = self.skeleton.points[from as usize];
-        [0.25, 0.5, 0.75, 1.0].into_iter().all(|t| self.inside.contains(start.lerp(to, t)))
+        [0.5, 1.0].into_iter().all(|t| self.inside.contains(start.lerp(to, t)))
     }
 
     /// Takes back the points from `first` on, none of which is a junction.
@@ -177,7 +177,7 @@ impl State<'_> {
         if changed > tolerance {
             junction.bounds = bounds;
             let point = junction.point as usize;
-            if let Some(mean) = self.scanner.mean_within(&bounds) {
+            if let Some(mean) = self.scanner.mean_within(&bounds).filter(|&p| self.inside.contains(p)) {
                 self.skeleton.points[point] = mean;
                 self.skeleton.sections[point] = Section::Box { low: bounds.low, high: bounds.high };
             }
