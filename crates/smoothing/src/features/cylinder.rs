@@ -50,6 +50,7 @@ pub(super) fn holes(
     let mut found = Vec::new();
     // Faces of rings that were grown and refused; most candidates of one false ring are neighbours.
     let mut refused = vec![false; mesh.face_count()];
+    let mut inside = vec![false; mesh.face_count()];
     for (k, candidate) in candidates.iter().enumerate() {
         if k % 64 == 0 {
             progress.check()?;
@@ -57,9 +58,8 @@ pub(super) fn holes(
         if taken[candidate.seed.index()] || refused[candidate.seed.index()] {
             continue;
         }
-        let Some((cylinder, faces)) = grow(mesh, connectivity, &normals, &taken, candidate, tolerance) else {
-            continue;
-        };
+        let grown = grow(mesh, connectivity, &normals, &taken, candidate, tolerance, &mut inside);
+        let Some((cylinder, faces)) = grown else { continue };
         if !is_ring(mesh, connectivity, &cylinder, &faces) {
             for f in &faces {
                 refused[f.index()] = true;
@@ -149,13 +149,16 @@ fn candidate(
     if values[1] < 0.005 * weight || values[0] > 0.12 * weight {
         return None;
     }
-    let cylinder = Cylinder::along(vectors[0], &points)?.refine(&points)?;
+    let rough = Cylinder::along(vectors[0], &points)?;
+    // Nearly all patches of a noisy surface end here, before the costly part.
+    if rough.misfit(&points) > 2.0 * FIRST_TOLERANCE * edge {
+        return None;
+    }
+    let cylinder = rough.refine(&points, 5)?;
     if cylinder.radius > largest {
         return None;
     }
-    let score = (points.iter().map(|&p| cylinder.distance(p).powi(2)).sum::<f64>() / points.len() as f64)
-        .sqrt()
-        / edge;
+    let score = cylinder.misfit(&points) / edge;
     let inward: f64 = patch.iter().map(|&f| mesh.area_vector(f).dot(cylinder.radial(mesh.centroid(f)))).sum();
     (score < FIRST_TOLERANCE && inward < 0.0).then_some(Candidate { score, seed, cylinder, edge })
 }
@@ -181,6 +184,8 @@ fn is_hollow(mesh: &TriangleMesh, connectivity: &Connectivity, normals: &[DVec3]
 }
 
 /// Grows from the seed over facets with all vertices on the cylinder, refits, and repeats until nothing changes.
+///
+/// `inside` is all false before and after: clearing what was set costs the size of the wall, not of the mesh.
 fn grow(
     mesh: &TriangleMesh,
     connectivity: &Connectivity,
@@ -188,10 +193,10 @@ fn grow(
     taken: &[bool],
     candidate: &Candidate,
     tolerance: f64,
+    inside: &mut [bool],
 ) -> Option<(Cylinder, Vec<FaceId>)> {
     let mut cylinder = candidate.cylinder;
     let mut faces: Vec<FaceId> = Vec::new();
-    let mut inside = vec![false; mesh.face_count()];
     let mut share = FIRST_TOLERANCE.max(tolerance);
     for _ in 0..16 {
         let limit = share * candidate.edge;
@@ -204,10 +209,8 @@ fn grow(
         if !fits(candidate.seed) {
             return None;
         }
-        for f in faces.drain(..) {
-            inside[f.index()] = false;
-        }
         let before = faces.len();
+        faces.clear();
         faces.push(candidate.seed);
         inside[candidate.seed.index()] = true;
         let mut next = 0;
@@ -221,6 +224,9 @@ fn grow(
             }
             next += 1;
         }
+        for f in &faces {
+            inside[f.index()] = false;
+        }
         if faces.len() < FEWEST_FACES {
             return None;
         }
@@ -230,7 +236,7 @@ fn grow(
         vertices.sort_unstable();
         vertices.dedup();
         let points: Vec<DVec3> = vertices.iter().map(|&v| mesh.position(v)).collect();
-        cylinder = cylinder.refine(&points)?;
+        cylinder = cylinder.refine(&points, 20)?;
         if settled {
             break;
         }

@@ -98,6 +98,11 @@ impl Cylinder {
         self.radial(p).length() - self.radius
     }
 
+    /// Root mean square distance of `points`.
+    pub(super) fn misfit(&self, points: &[DVec3]) -> f64 {
+        (points.iter().map(|&p| self.distance(p).powi(2)).sum::<f64>() / points.len() as f64).sqrt()
+    }
+
     /// The cylinder along `axis` whose circle fits `points` best in the algebraic sense (Kåsa).
     pub(super) fn along(axis: DVec3, points: &[DVec3]) -> Option<Self> {
         let (u, v) = axis.any_orthonormal_pair();
@@ -129,11 +134,11 @@ impl Cylinder {
         })
     }
 
-    /// Least squares of the distances of `points` by Gauss-Newton, from here.
-    pub(super) fn refine(mut self, points: &[DVec3]) -> Option<Self> {
+    /// Least squares of the distances of `points` by at most `rounds` steps of Gauss-Newton, from here.
+    pub(super) fn refine(mut self, points: &[DVec3], rounds: usize) -> Option<Self> {
         let n = points.len() as f64;
         let origin = points.iter().sum::<DVec3>() / n;
-        for _ in 0..20 {
+        for _ in 0..rounds {
             // Keep the point of the axis near the data, so that tilt and shift do not trade off.
             self.point += self.axis * self.axis.dot(origin - self.point);
             let (u, v) = self.axis.any_orthonormal_pair();
@@ -207,7 +212,7 @@ mod tests {
             })
             .collect();
         let tilted = (axis + 0.15 * u - 0.1 * v).normalize();
-        let fit = Cylinder::along(tilted, &points).and_then(|c| c.refine(&points)).expect("well posed");
+        let fit = Cylinder::along(tilted, &points).and_then(|c| c.refine(&points, 20)).expect("well posed");
         assert!((fit.radius - 4.0).abs() < 1e-12);
         assert!((fit.axis.dot(axis).abs() - 1.0).abs() < 1e-12);
         assert!(fit.radial(center).length() < 1e-11);
