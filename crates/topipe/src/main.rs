@@ -1,3 +1,5 @@
-//! `topipe`: from a topology optimization result to a closed CAD solid.
+//! The `topipe` command; see the library for what it does.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    topipe::main()
+}

@@ -1,0 +1,248 @@
+//! The command line.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use topipe_engine::{Choice, Override, RunOptions};
+
+/// From a topology optimization result to a closed CAD solid.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    after_help = "Exit codes: 0 done; 1 a stage failed; 2 bad command line or pipeline; 3 geometry or data refused; \
+                  4 trouble with the cache or a file; 130 interrupted (what was finished stays finished)."
+)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// Say more: reasons, remarks of stages, logs.
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    pub verbose: bool,
+    /// Say nothing but errors.
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+}
+
+/// How much is said.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Verbosity {
+    /// Errors.
+    Quiet,
+    /// What happened.
+    Normal,
+    /// And why.
+    Verbose,
+}
+
+impl Arguments {
+    /// How much is said.
+    pub fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Verbose,
+            _ => Verbosity::Normal,
+        }
+    }
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a pipeline; what is known already is not computed again.
+    Run(RunArguments),
+    /// Say what a run would do, and why.
+    Plan(PlanArguments),
+    /// Print the graph of a pipeline.
+    Graph(GraphArguments),
+    /// List the kinds of stages, or the fields of one kind.
+    Stages {
+        /// The kind.
+        kind: Option<String>,
+    },
+    /// Print the JSON schema of pipelines, for editors.
+    Schema,
+    /// Say what is in a mesh file, an artifact file, or the result of a stage.
+    Inspect(InspectArguments),
+    /// Look at the cache.
+    Cache(CacheArguments),
+    /// Write a commented pipeline for a mesh.
+    New(NewArguments),
+    /// Print a completion script.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+/// A pipeline and where its results are kept.
+#[derive(Debug, Clone, Args)]
+pub struct PipelineArguments {
+    /// The pipeline, a TOML file.
+    pub pipeline: PathBuf,
+    /// The cache [default: .topipe beside the pipeline].
+    #[arg(long, env = "TOPIPE_CACHE", value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+    /// Use another value than the pipeline says.
+    #[arg(long = "set", value_name = "STAGE.FIELD=VALUE")]
+    pub set: Vec<Override>,
+}
+
+impl PipelineArguments {
+    /// The cache folder.
+    pub fn cache(&self) -> PathBuf {
+        let beside = || self.pipeline.parent().unwrap_or(Path::new("")).join(".topipe");
+        self.cache.clone().unwrap_or_else(beside)
+    }
+}
+
+/// Which stages.
+#[derive(Debug, Clone, Args)]
+pub struct ChoiceArguments {
+    /// Only this stage and what it depends on.
+    #[arg(long, value_name = "STAGE")]
+    pub until: Vec<String>,
+    /// Only this stage and what depends on it.
+    #[arg(long, value_name = "STAGE")]
+    pub from: Vec<String>,
+    /// Only this stage; its inputs must be in the cache.
+    #[arg(long, value_name = "STAGE")]
+    pub only: Vec<String>,
+    /// Run this stage even if its result is known.
+    #[arg(long, value_name = "STAGE")]
+    pub force: Vec<String>,
+}
+
+impl ChoiceArguments {
+    /// As the engine takes it.
+    pub fn choice(&self) -> Choice {
+        Choice {
+            until: self.until.clone(),
+            from: self.from.clone(),
+            only: self.only.clone(),
+            force: self.force.clone(),
+        }
+    }
+}
+
+/// `topipe run`.
+#[derive(Debug, Args)]
+pub struct RunArguments {
+    /// The pipeline.
+    #[command(flatten)]
+    pub pipeline: PipelineArguments,
+    /// Which stages.
+    #[command(flatten)]
+    pub choice: ChoiceArguments,
+    /// The folder for exports and run.json [default: topipe-out/NAME].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Threads, and stages at the same time [default: all processors].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// After a failure, still run what does not depend on it.
+    #[arg(long)]
+    pub keep_going: bool,
+    /// Wait at most this long for another process that computes the same, s [default: for ever].
+    #[arg(long, value_name = "SECONDS")]
+    pub lock_timeout: Option<u64>,
+    /// One JSON object per event on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl RunArguments {
+    /// As the engine takes it, for a pipeline of this name.
+    pub fn options(&self, name: &str) -> RunOptions {
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        RunOptions {
+            out: self.out.clone().unwrap_or_else(|| Path::new("topipe-out").join(name)),
+            choice: self.choice.choice(),
+            jobs: self.jobs.map_or(processors, usize::from),
+            keep_going: self.keep_going,
+            lock_timeout: self.lock_timeout.map(Duration::from_secs),
+            program: concat!("topipe ", env!("CARGO_PKG_VERSION")).into(),
+        }
+    }
+}
+
+/// `topipe plan`.
+#[derive(Debug, Args)]
+pub struct PlanArguments {
+    /// The pipeline.
+    #[command(flatten)]
+    pub pipeline: PipelineArguments,
+    /// Which stages.
+    #[command(flatten)]
+    pub choice: ChoiceArguments,
+    /// The plan as one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A language for graphs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum GraphFormat {
+    /// Mermaid, which GitHub and many editors draw.
+    Mermaid,
+    /// Graphviz.
+    Dot,
+}
+
+/// `topipe graph`.
+#[derive(Debug, Args)]
+pub struct GraphArguments {
+    /// The pipeline, a TOML file.
+    pub pipeline: PathBuf,
+    /// The language.
+    #[arg(long, value_enum, default_value = "mermaid")]
+    pub format: GraphFormat,
+}
+
+/// `topipe inspect`.
+#[derive(Debug, Args)]
+pub struct InspectArguments {
+    /// A mesh file, an artifact file, or with --pipeline the name of a stage.
+    pub target: String,
+    /// The pipeline of the stage.
+    #[arg(long, value_name = "PIPELINE")]
+    pub pipeline: Option<PathBuf>,
+    /// The cache [default: .topipe beside the pipeline].
+    #[arg(long, env = "TOPIPE_CACHE", value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+}
+
+/// `topipe cache`.
+#[derive(Debug, Args)]
+pub struct CacheArguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: CacheCommand,
+    /// The cache.
+    #[arg(long, env = "TOPIPE_CACHE", value_name = "DIR", default_value = ".topipe", global = true)]
+    pub cache: PathBuf,
+}
+
+/// What `topipe cache` can do.
+#[derive(Debug, Clone, Copy, Subcommand)]
+pub enum CacheCommand {
+    /// List the results that are kept.
+    Ls,
+    /// Say how much room they take.
+    Du,
+    /// Check every file against its hash; move aside what does not verify.
+    Verify,
+}
+
+/// `topipe new`.
+#[derive(Debug, Args)]
+pub struct NewArguments {
+    /// The mesh: STL, OFF, OBJ or PLY.
+    pub mesh: PathBuf,
+    /// The pipeline to write [default: the mesh's name with .toml, in this folder].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Replace the pipeline if it exists.
+    #[arg(long)]
+    pub overwrite: bool,
+}

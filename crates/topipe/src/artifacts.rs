@@ -1,0 +1,33 @@
+//! The kinds of artifacts and the types behind them.
+//!
+//! Raise a version when the serialized form of its type changes.
+
+use topipe_engine::ArtifactKind;
+
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $kind:ident = $name:literal v $version:literal: $value:ty;)*) => {$(
+        $(#[$doc])*
+        #[derive(Debug)]
+        pub struct $kind;
+        impl ArtifactKind for $kind {
+            type Value = $value;
+            const NAME: &'static str = $name;
+            const VERSION: u32 = $version;
+        }
+    )*};
+}
+
+kinds! {
+    /// A triangle mesh with its labels, features and provenance.
+    Mesh = "mesh" v 1: topipe_mesh::Part;
+    /// A partition of a mesh into disks.
+    Tiling = "tiling" v 1: topipe_tiling::Tiling;
+    /// A partition of a mesh into quadrilaterals.
+    QuadLayout = "quad layout" v 1: topipe_quad_matching::QuadLayout;
+    /// A closed surface of B-spline patches.
+    SplineSurface = "spline surface" v 1: topipe_spline_fit::SplineSurface;
+    /// A curve skeleton.
+    Skeleton = "skeleton" v 1: topipe_skeleton::Skeleton;
+    /// The figures of a validation.
+    Report = "report" v 1: topipe_validation::Report;
+}

@@ -1,0 +1,144 @@
+//! `topipe inspect`.
+
+use crate::args::InspectArguments;
+use crate::artifacts::{Mesh, QuadLayout, Report, Skeleton, SplineSurface, Tiling};
+use crate::display;
+use crate::failure::Failure;
+use crate::stages::registry;
+use std::fmt::Write;
+use std::path::Path;
+use topipe_engine::cache::Bucket;
+use topipe_engine::{ArtifactKind, Cache, Choice, Diagnostic, ExitCode, Pipeline, Source, codec, plan};
+use topipe_mesh::{Connectivity, Design, Part};
+
+pub(crate) fn run(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
+    let path = match &arguments.pipeline {
+        Some(pipeline) => stage_file(arguments, pipeline)?,
+        None => arguments.target.clone().into(),
+    };
+    let bytes = std::fs::read(&path).map_err(|error| Failure::io("read", &path, &error))?;
+    let text = match codec::open(&bytes) {
+        Ok((header, _)) => artifact(&header, &bytes)?,
+        Err(codec::DecodeError::NotAnArtifact) => mesh_file(&path, &bytes)?,
+        Err(error) => return Err(Failure::new(ExitCode::Storage, format!("{}: {error}", path.display()))),
+    };
+    super::print(&text)
+}
+
+/// The artifact file of a stage.
+fn stage_file(arguments: &InspectArguments, path: &Path) -> Result<std::path::PathBuf, Failure> {
+    let pipeline = Pipeline::load(path, &[], &registry())?;
+    let stage = &arguments.target;
+    if pipeline.index_of(stage).is_none() {
+        let source = Source { name: "command line".into(), text: format!("inspect {stage}") };
+        let names = pipeline.stages.iter().map(|node| node.name.as_str());
+        return Err(Diagnostic::new(
+            &source.into(),
+            8..8 + stage.len(),
+            format!("there is no stage `{stage}`"),
+        )
+        .suggest(stage, names)
+        .into());
+    }
+    let beside = || path.parent().unwrap_or(Path::new("")).join(".topipe");
+    let cache = Cache::new(arguments.cache.clone().unwrap_or_else(beside));
+    let choice = Choice { until: vec![stage.clone()], ..Choice::default() };
+    let planned = plan(&pipeline, &cache, &choice)?.stages.pop();
+    let record = match planned.and_then(|planned| planned.key) {
+        Some(key) => cache.key_record(key, &mut Vec::new())?,
+        None => None,
+    };
+    match record {
+        Some(record) => Ok(cache.path(Bucket::Artifacts, record.artifact)),
+        None => Err(Failure::new(
+            ExitCode::Storage,
+            format!("stage `{stage}` has no result in the cache; run it with `topipe run --until {stage}`"),
+        )),
+    }
+}
+
+fn artifact(header: &codec::Header, bytes: &[u8]) -> Result<String, Failure> {
+    fn decode<K: ArtifactKind>(bytes: &[u8]) -> Result<K::Value, Failure> {
+        codec::decode(bytes, K::NAME, K::VERSION)
+            .map_err(|error| Failure::new(ExitCode::Storage, error.to_string()))
+    }
+    let mut text = format!(
+        "{} (version {}), {}\nartifact {}\n",
+        header.kind,
+        header.version,
+        display::size(bytes.len() as u64),
+        header.identity()
+    );
+    match header.kind.as_str() {
+        Mesh::NAME => text += &describe_part(&decode::<Mesh>(bytes)?),
+        Tiling::NAME => {
+            let tiling = decode::<Tiling>(bytes)?;
+            let _ = writeln!(text, "{} tiles", tiling.tile_count());
+            text += &describe_part(&tiling.part);
+        }
+        QuadLayout::NAME => {
+            let layout = decode::<QuadLayout>(bytes)?;
+            let _ = writeln!(
+                text,
+                "{} quads, {} sides, {} corners",
+                layout.quads.len(),
+                layout.edges.len(),
+                layout.vertices.len()
+            );
+            text += &describe_part(&layout.part);
+        }
+        SplineSurface::NAME => {
+            let surface = decode::<SplineSurface>(bytes)?;
+            let _ = writeln!(
+                text,
+                "{} patches, {} edge curves, {} vertices",
+                surface.patches.len(),
+                surface.edges.len(),
+                surface.vertices.len()
+            );
+        }
+        Skeleton::NAME => {
+            let skeleton = decode::<Skeleton>(bytes)?;
+            let _ = writeln!(text, "{} points, {} edges", skeleton.points.len(), skeleton.edges.len());
+        }
+        Report::NAME => text += &decode::<Report>(bytes)?.summary(),
+        _ => {}
+    }
+    Ok(text)
+}
+
+fn mesh_file(path: &Path, bytes: &[u8]) -> Result<String, Failure> {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let part = topipe_mesh::import::read(&name, bytes, &Default::default())
+        .map_err(|error| Failure::new(ExitCode::Refused, error.to_string()))?;
+    Ok(format!("{}, {}\n{}", part.import.format, display::size(bytes.len() as u64), describe_part(&part)))
+}
+
+fn describe_part(part: &Part) -> String {
+    let mesh = &part.mesh;
+    let mut text = format!("{} triangles, {} vertices\n", mesh.face_count(), mesh.vertex_count());
+    match Connectivity::build(mesh) {
+        Ok(connectivity) => {
+            let genus = connectivity.genus(mesh).map_or("unknown".to_owned(), |genus| genus.to_string());
+            let _ = writeln!(text, "{} component(s), genus {genus}", connectivity.components().1);
+        }
+        Err(error) => {
+            let _ = writeln!(text, "not an oriented manifold: {error}");
+        }
+    }
+    let (low, high) = mesh.bounds();
+    let _ = writeln!(text, "from {low} to {high} mm");
+    let _ = writeln!(text, "volume {:.6} mm^3, area {:.6} mm^2", mesh.volume(), mesh.area());
+    let fixed = part.design.iter().filter(|&&design| design == Design::NonDesign).count();
+    let frozen = part.frozen.iter().filter(|&&frozen| frozen).count();
+    let _ = writeln!(
+        text,
+        "{fixed} non-design faces, {frozen} frozen vertices, {} regions, {} feature edges",
+        part.regions.len(),
+        part.feature_edges.len()
+    );
+    for repair in &part.import.repairs {
+        let _ = writeln!(text, "repaired: {} ({})", repair.what, repair.count);
+    }
+    text
+}

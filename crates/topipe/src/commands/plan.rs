@@ -1,0 +1,43 @@
+//! `topipe plan`.
+
+use crate::args::PlanArguments;
+use crate::failure::Failure;
+use crate::stages::registry;
+use std::fmt::Write;
+use topipe_engine::{Action, Cache, ExitCode, Pipeline, Plan, plan};
+
+pub(crate) fn run(arguments: &PlanArguments) -> Result<ExitCode, Failure> {
+    let pipeline = Pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry())?;
+    let cache = Cache::new(arguments.pipeline.cache());
+    let plan = plan(&pipeline, &cache, &arguments.choice.choice())?;
+    for damage in &plan.damages {
+        tracing::warn!("{}: {}; moved aside", damage.path.display(), damage.reason);
+    }
+    let text = if arguments.json {
+        serde_json::to_string(&plan)
+            .map_err(|error| Failure::new(ExitCode::Storage, format!("cannot write the plan: {error}")))?
+            + "\n"
+    } else {
+        describe(&plan)
+    };
+    super::print(&text)
+}
+
+fn describe(plan: &Plan) -> String {
+    let width = |of: fn(&topipe_engine::PlannedStage) -> usize| plan.stages.iter().map(of).max().unwrap_or(0);
+    let (names, kinds) = (width(|stage| stage.stage.chars().count()), width(|stage| stage.kind.len()));
+    let mut text = format!("{}\n", plan.pipeline);
+    for stage in &plan.stages {
+        let action = match &stage.action {
+            Action::Cached => "cached".to_owned(),
+            Action::Run => "runs".to_owned(),
+            Action::Depends { on } => format!("runs if the result of {} changes", on.join(" or ")),
+            Action::Missing => "is not selected and has no result: run it first".to_owned(),
+        };
+        let _ = writeln!(text, "  {:names$}  {:kinds$}  {action}", stage.stage, stage.kind);
+        for reason in &stage.reasons {
+            let _ = writeln!(text, "  {:names$}  {:kinds$}    {reason}", "", "");
+        }
+    }
+    text
+}

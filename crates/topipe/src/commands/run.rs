@@ -1,0 +1,68 @@
+//! `topipe run`.
+
+use crate::args::{RunArguments, Verbosity};
+use crate::artifacts::Report;
+use crate::display::{self, Console, JsonLines};
+use crate::failure::Failure;
+use crate::stages::registry;
+use std::sync::Arc;
+use topipe_engine::{
+    ArtifactKind, ArtifactType, Cache, EventSink, ExitCode, Interrupt, Pipeline, RunRecord,
+    run as run_pipeline,
+};
+
+pub(crate) fn run(arguments: &RunArguments, verbosity: Verbosity) -> Result<ExitCode, Failure> {
+    let registry = registry();
+    let pipeline = Pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry)?;
+    let options = arguments.options(&pipeline.name);
+    if let Some(jobs) = arguments.jobs {
+        // Fails only if the pool exists already, which it does not yet.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(jobs)).build_global();
+    }
+    let cache = Cache::new(arguments.pipeline.cache());
+    let interrupt = stop_on_signal();
+    let console = Arc::new(Console::new(verbosity, !arguments.json));
+    let sink: Arc<dyn EventSink> = if arguments.json {
+        Arc::new(JsonLines::new(Arc::clone(&console)))
+    } else {
+        Arc::clone(&console) as _
+    };
+    let record = run_pipeline(&pipeline, &cache, &options, &interrupt, sink)?;
+    console.finish();
+    if !arguments.json && verbosity > Verbosity::Quiet {
+        super::print(&display::summary(&record, &options.out, &figures(&record, &cache)))?;
+    }
+    Ok(record.code)
+}
+
+/// The first signal asks the run to stop, the second ends the process.
+fn stop_on_signal() -> Interrupt {
+    let interrupt = Interrupt::new();
+    let raised = interrupt.clone();
+    let handler = move || {
+        if raised.raise() {
+            std::process::exit(i32::from(ExitCode::Interrupted.number()));
+        }
+        eprintln!("stopping; once more to stop at once");
+    };
+    if let Err(error) = ctrlc::set_handler(handler) {
+        tracing::warn!("the run cannot be interrupted cleanly: {error}");
+    }
+    interrupt
+}
+
+/// The main figures of each report of the run.
+fn figures(record: &RunRecord, cache: &Cache) -> Vec<(String, String)> {
+    let mut figures = Vec::new();
+    for stage in record.stages.iter().filter(|stage| stage.artifact_kind == Report::NAME) {
+        let Some(artifact) = stage.artifact else { continue };
+        // A report that cannot be read now is told of by the next run.
+        let loaded = cache.load(&ArtifactType::of::<Report>(), artifact, &mut Vec::new());
+        if let Ok(Some(value)) = loaded
+            && let Some(report) = value.downcast_ref::<topipe_validation::Report>()
+        {
+            figures.push((stage.stage.clone(), report.summary()));
+        }
+    }
+    figures
+}

@@ -1,0 +1,195 @@
+//! What people see: progress on stderr while it runs, a summary on stdout at the end.
+
+use crate::args::Verbosity;
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::io::{IsTerminal, Write as _};
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+use topipe_engine::{Event, EventSink, ExportOutcome, Outcome, RunRecord};
+
+/// Whether stderr is a terminal on which colors are welcome (<https://no-color.org>).
+pub(crate) fn colors_on_stderr() -> bool {
+    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
+
+/// "1.2 s", "340 ms".
+pub(crate) fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.0005 => "0 ms".into(),
+        s if s < 1.0 => format!("{:.0} ms", s * 1e3),
+        s if s < 100.0 => format!("{s:.1} s"),
+        s => format!("{:.0} min {:.0} s", (s / 60.0).floor(), s % 60.0),
+    }
+}
+
+/// "12 B", "3.4 MB".
+pub(crate) fn size(bytes: u64) -> String {
+    let mut value = bytes as f64;
+    for unit in ["B", "kB", "MB", "GB"] {
+        if value < 1000.0 {
+            return if unit == "B" { format!("{bytes} B") } else { format!("{value:.1} {unit}") };
+        }
+        value /= 1000.0;
+    }
+    format!("{value:.1} TB")
+}
+
+/// Follows a run on stderr: bars on a terminal, lines for what needs attention everywhere.
+pub(crate) struct Console {
+    verbosity: Verbosity,
+    bars: MultiProgress,
+    running: Mutex<HashMap<String, ProgressBar>>,
+}
+
+impl Console {
+    pub(crate) fn new(verbosity: Verbosity, bars: bool) -> Self {
+        let show = bars && verbosity > Verbosity::Quiet && std::io::stderr().is_terminal();
+        let target = if show { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        Self { verbosity, bars: MultiProgress::with_draw_target(target), running: Mutex::default() }
+    }
+
+    /// Takes the bars away.
+    pub(crate) fn finish(&self) {
+        // The terminal may be gone; then there is nothing to take away.
+        let _ = self.bars.clear();
+    }
+
+    fn line(&self, at_least: Verbosity, text: &str) {
+        if self.verbosity >= at_least {
+            self.bars.suspend(|| eprintln!("{text}"));
+        }
+    }
+
+    fn start(&self, stage: &str) {
+        let bar = self.bars.add(ProgressBar::new_spinner());
+        // The template is constant and right; were it not, the plain style would do.
+        if let Ok(style) = ProgressStyle::with_template("  {spinner} {prefix} {wide_msg} {elapsed}") {
+            bar.set_style(style);
+        }
+        bar.set_prefix(stage.to_owned());
+        bar.enable_steady_tick(Duration::from_millis(120));
+        self.running.lock().unwrap_or_else(PoisonError::into_inner).insert(stage.to_owned(), bar);
+    }
+
+    fn end(&self, stage: &str) {
+        if let Some(bar) = self.running.lock().unwrap_or_else(PoisonError::into_inner).remove(stage) {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl EventSink for Console {
+    fn event(&self, event: &Event) {
+        match event {
+            Event::StageStarted { stage, reasons, .. } => {
+                let reasons: Vec<String> = reasons.iter().map(ToString::to_string).collect();
+                self.line(Verbosity::Verbose, &format!("{stage}: {}", reasons.join("; ")));
+                self.start(stage);
+            }
+            Event::StageProgress { stage, done, total, what } => {
+                if let Some(bar) = self.running.lock().unwrap_or_else(PoisonError::into_inner).get(stage) {
+                    let of = if *total > 0 { format!(" of {total}") } else { String::new() };
+                    bar.set_message(format!("{done}{of} {what}"));
+                }
+            }
+            Event::StageWaiting { stage, holder } => {
+                self.line(
+                    Verbosity::Normal,
+                    &format!("{stage}: waiting for {holder}, which computes the same"),
+                );
+            }
+            Event::StageRemark { stage, text } => self.line(Verbosity::Verbose, &format!("{stage}: {text}")),
+            Event::StageFinished { stage, .. } => self.end(stage),
+            Event::StageFailed { stage, message, .. } => {
+                self.end(stage);
+                self.line(Verbosity::Quiet, &format!("error: stage `{stage}`: {message}"));
+            }
+            Event::ExportFailed { file, message, .. } => {
+                self.line(Verbosity::Quiet, &format!("error: export {file}: {message}"));
+            }
+            Event::Quarantined { path, reason, moved_to } => {
+                let moved = match moved_to {
+                    Some(to) => format!("moved to {}", to.display()),
+                    None => "it could not be moved aside".into(),
+                };
+                let text =
+                    format!("warning: damaged file in the cache: {}: {reason}; {moved}", path.display());
+                self.line(Verbosity::Normal, &text);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Writes each event as one line of JSON to stdout; what needs attention goes to the console as well.
+pub(crate) struct JsonLines {
+    console: Arc<Console>,
+}
+
+impl JsonLines {
+    pub(crate) fn new(console: Arc<Console>) -> Self {
+        Self { console }
+    }
+}
+
+impl EventSink for JsonLines {
+    fn event(&self, event: &Event) {
+        self.console.event(event);
+        if let Ok(line) = serde_json::to_string(event) {
+            let mut stdout = std::io::stdout().lock();
+            // Whoever listened may be gone; the run goes on.
+            let _ = writeln!(stdout, "{line}").and_then(|()| stdout.flush());
+        }
+    }
+}
+
+/// What a run did, for the terminal.
+pub(crate) fn summary(record: &RunRecord, out: &Path, figures: &[(String, String)]) -> String {
+    let mut text = format!("{} ({})\n", record.pipeline, duration(record.seconds));
+    let names = record.stages.iter().map(|stage| stage.stage.chars().count()).max().unwrap_or(0);
+    let kinds = record.stages.iter().map(|stage| stage.kind.len()).max().unwrap_or(0);
+    for stage in &record.stages {
+        let state = match &stage.outcome {
+            Outcome::Computed => duration(stage.seconds.unwrap_or_default()),
+            Outcome::Cached => "cached".into(),
+            Outcome::Failed { .. } => "failed".into(),
+            Outcome::Skipped { because } => format!("skipped: {because}"),
+        };
+        let _ = writeln!(text, "  {:names$}  {:kinds$}  {state}", stage.stage, stage.kind);
+    }
+    if !record.exports.is_empty() {
+        let _ = writeln!(text, "\n{}", out.display());
+        let files = record.exports.iter().map(|export| export.file.chars().count()).max().unwrap_or(0);
+        for export in &record.exports {
+            let state = match &export.outcome {
+                ExportOutcome::Written => format!("written, {}", size(export.bytes.unwrap_or_default())),
+                ExportOutcome::UpToDate => "up to date".into(),
+                ExportOutcome::Skipped => "not written: its stage gave no result".into(),
+                ExportOutcome::Failed { .. } => "failed".into(),
+            };
+            let _ = writeln!(text, "  {:files$}  {state}", export.file);
+        }
+    }
+    for (stage, figures) in figures {
+        let _ = writeln!(text, "\n{stage}\n{}", figures.trim_end());
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_for_people() {
+        assert_eq!(duration(0.0), "0 ms");
+        assert_eq!(duration(0.34), "340 ms");
+        assert_eq!(duration(1.25), "1.2 s");
+        assert_eq!(duration(125.0), "2 min 5 s");
+        assert_eq!(size(999), "999 B");
+        assert_eq!(size(1_234_567), "1.2 MB");
+    }
+}

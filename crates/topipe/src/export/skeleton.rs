@@ -1,0 +1,10 @@
+//! Skeletons as JSON.
+
+use crate::artifacts::Skeleton;
+use topipe_engine::Exporter;
+
+pub(super) fn exporters() -> Vec<Exporter> {
+    vec![Exporter::new::<Skeleton>("json", env!("TOPIPE_CODE_SKELETON"), |skeleton, _, file| {
+        Ok(writeln!(file, "{:#}", skeleton.to_json())?)
+    })]
+}

@@ -1,0 +1,48 @@
+//! `kind = "smoothing"`.
+
+use super::bad_value;
+use crate::artifacts::Mesh;
+use topipe_engine::{BadValue, InputPort, Stage, StageContext, StageError};
+use topipe_smoothing::{Parameters, SmoothingError, smooth};
+
+/// Smooths a mesh.
+pub(super) struct Smoothing;
+
+impl Stage for Smoothing {
+    type Parameters = Parameters;
+    type Output = Mesh;
+    const KIND: &'static str = "smoothing";
+    const SUMMARY: &'static str =
+        "Smooths a mesh; keeps its volume, its holes, its flat and its non-design faces.";
+
+    fn code_version(&self) -> String {
+        env!("TOPIPE_CODE_SMOOTHING").into()
+    }
+
+    fn inputs(&self) -> Vec<InputPort> {
+        vec![InputPort::required::<Mesh>("input", "The mesh.")]
+    }
+
+    fn check(&self, parameters: &Parameters) -> Result<(), BadValue> {
+        parameters.check().map_err(|error| match &error {
+            SmoothingError::Parameter { name, .. } => bad_value(name, &error),
+            error => bad_value("", error),
+        })
+    }
+
+    fn run(
+        &self,
+        context: &StageContext<'_>,
+        parameters: &Parameters,
+    ) -> Result<topipe_mesh::Part, StageError> {
+        let part = context.input::<Mesh>("input")?;
+        smooth(&part, parameters, context.progress()).map_err(|error| match error {
+            SmoothingError::Interrupted(_) => StageError::Interrupted,
+            SmoothingError::Parameter { .. } => StageError::BadParameter(error.to_string()),
+            SmoothingError::Diverged { .. } | SmoothingError::VolumeOutOfReach { .. } => {
+                StageError::Failed(error.to_string())
+            }
+            error => StageError::Refused(error.to_string()),
+        })
+    }
+}

@@ -1,0 +1,448 @@
+//! The command as a user meets it: exit codes, outputs, what a second run does.
+//!
+//! A small part is made here, so that a run takes a fraction of a second and every figure is known.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A folder with a box and a pipeline that smooths it.
+struct Workshop {
+    folder: TempDir,
+}
+
+const PIPELINE: &str = r#"
+name = "box"
+
+[stage.mesh]
+kind = "import"
+path = "box.off"
+
+[stage.smooth]
+kind = "smoothing"
+input = "mesh"
+method = "taubin"
+detect_planes = false
+
+[stage.check]
+kind = "validation"
+original = "mesh"
+mesh = "smooth"
+
+[export]
+"smooth.stl" = "smooth"
+"smooth.ply" = "smooth"
+"report.json" = "check"
+"#;
+
+/// A box of 3 x 2 x 1 mm with `n` squares along each edge, as OFF.
+fn box_off(n: usize) -> String {
+    let mut points: Vec<[f64; 3]> = Vec::new();
+    let mut faces: Vec<[usize; 4]> = Vec::new();
+    let size = [3.0, 2.0, 1.0];
+    for axis in 0..3 {
+        for end in 0..2 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let mut index = |i: usize, j: usize| {
+                let mut p = [0.0; 3];
+                p[axis] = size[axis] * end as f64;
+                p[u] = size[u] * i as f64 / n as f64;
+                p[v] = size[v] * j as f64 / n as f64;
+                points.iter().position(|q| *q == p).unwrap_or_else(|| {
+                    points.push(p);
+                    points.len() - 1
+                })
+            };
+            for i in 0..n {
+                for j in 0..n {
+                    let mut face = [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)];
+                    if end == 0 {
+                        face.reverse();
+                    }
+                    faces.push(face);
+                }
+            }
+        }
+    }
+    let mut text = format!("OFF\n{} {} 0\n", points.len(), faces.len());
+    for [x, y, z] in points {
+        text += &format!("{x} {y} {z}\n");
+    }
+    for [a, b, c, d] in faces {
+        text += &format!("4 {a} {b} {c} {d}\n");
+    }
+    text
+}
+
+impl Workshop {
+    fn new() -> Self {
+        let shop = Self { folder: tempfile::tempdir().unwrap() };
+        shop.write("box.off", &box_off(6));
+        shop.write("box.toml", PIPELINE);
+        shop
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).unwrap();
+    }
+
+    fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    fn edit(&self, old: &str, new: &str) {
+        let text = self.read("box.toml");
+        assert!(text.contains(old));
+        self.write("box.toml", &text.replace(old, new));
+    }
+
+    fn topipe(&self, arguments: &[&str]) -> Ended {
+        let output = Command::new(env!("CARGO_BIN_EXE_topipe"))
+            .current_dir(self.folder.path())
+            .env_remove("TOPIPE_CACHE")
+            .env_remove("RUST_LOG")
+            .args(arguments)
+            .output()
+            .unwrap();
+        Ended {
+            code: output.status.code().unwrap(),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
+    /// The events of a run that ends well, without progress and times: "stage-cached mesh".
+    fn events(&self, arguments: &[&str]) -> Vec<String> {
+        let ended = self.topipe(&[&["run", "box.toml", "--json", "--jobs", "1"], arguments].concat());
+        assert_eq!(ended.code, 0, "{}", ended.stderr);
+        let events = ended.stdout.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+        events
+            .map(|event| {
+                let subject =
+                    event.get("file").or(event.get("stage")).or(event.get("code")).and_then(Value::as_str);
+                format!("{} {}", event["event"].as_str().unwrap(), subject.unwrap_or_default())
+            })
+            .filter(|line| !line.starts_with("stage-progress") && !line.starts_with("stage-remark"))
+            .collect()
+    }
+}
+
+#[derive(Debug)]
+struct Ended {
+    code: i32,
+    stdout: String,
+    stderr: String,
+}
+
+const EVERYTHING: [&str; 11] = [
+    "run-started ",
+    "stage-started mesh",
+    "stage-finished mesh",
+    "stage-started smooth",
+    "stage-finished smooth",
+    "stage-started check",
+    "stage-finished check",
+    "export-written smooth.stl",
+    "export-written smooth.ply",
+    "export-written report.json",
+    "run-finished done",
+];
+
+const NOTHING: [&str; 8] = [
+    "run-started ",
+    "stage-cached mesh",
+    "stage-cached smooth",
+    "stage-cached check",
+    "export-up-to-date smooth.stl",
+    "export-up-to-date smooth.ply",
+    "export-up-to-date report.json",
+    "run-finished done",
+];
+
+#[test]
+fn the_first_run_does_everything_and_the_second_nothing() {
+    let shop = Workshop::new();
+    assert_eq!(shop.events(&[]), EVERYTHING);
+    assert_eq!(shop.events(&[]), NOTHING);
+    let report: Value = serde_json::from_str(&shop.read("topipe-out/box/report.json")).unwrap();
+    let volume = report["original"]["volume_mm3"].as_f64().unwrap();
+    assert!((volume - 6.0).abs() < 1e-12, "{volume}");
+    assert_eq!(report["original"]["genus"], 0);
+    assert_eq!(report["smoothing"]["method"], "taubin");
+    assert!(shop.path(".topipe").is_dir());
+}
+
+#[test]
+fn the_run_follows_the_plan() {
+    let shop = Workshop::new();
+    let plan = |shop: &Workshop| -> Value {
+        let ended = shop.topipe(&["plan", "box.toml", "--json"]);
+        assert_eq!(ended.code, 0, "{}", ended.stderr);
+        serde_json::from_str(&ended.stdout).unwrap()
+    };
+    let actions = |plan: &Value| -> Vec<String> {
+        let stages = plan["stages"].as_array().unwrap();
+        stages
+            .iter()
+            .map(|stage| format!("{} {}", stage["stage"], stage["action"]).replace('"', ""))
+            .collect()
+    };
+    assert_eq!(actions(&plan(&shop)), ["mesh run", "smooth depends", "check depends"]);
+    shop.events(&[]);
+    assert_eq!(actions(&plan(&shop)), ["mesh cached", "smooth cached", "check cached"]);
+
+    shop.edit("method = \"taubin\"", "method = \"taubin\"\nlambda = 0.5");
+    let planned = plan(&shop);
+    assert_eq!(actions(&planned), ["mesh cached", "smooth run", "check depends"]);
+    let reason = &planned["stages"][1]["reasons"][0];
+    assert_eq!(
+        (&reason["field"], &reason["old"], &reason["new"]),
+        (&"lambda".into(), &0.6307.into(), &0.5.into())
+    );
+    let shown = shop.topipe(&["plan", "box.toml"]).stdout;
+    assert!(shown.contains("lambda: 0.6307 -> 0.5"), "{shown}");
+    let events = shop.events(&[]);
+    assert_eq!(events[1..4], ["stage-cached mesh", "stage-started smooth", "stage-finished smooth"]);
+}
+
+#[test]
+fn an_export_that_is_gone_comes_back() {
+    let shop = Workshop::new();
+    shop.events(&[]);
+    std::fs::remove_file(shop.path("topipe-out/box/smooth.ply")).unwrap();
+    let events = shop.events(&[]);
+    assert_eq!(events[4..7], [NOTHING[4], "export-written smooth.ply", NOTHING[6]]);
+}
+
+#[test]
+fn outputs_and_cache_go_where_they_are_told() {
+    let shop = Workshop::new();
+    let ended = shop.topipe(&["run", "box.toml", "--out", "here", "--cache", "there"]);
+    assert_eq!(ended.code, 0, "{}", ended.stderr);
+    assert!(shop.path("here/smooth.stl").is_file() && shop.path("here/run.json").is_file());
+    assert!(shop.path("there/artifacts-v1").is_dir());
+    assert!(!shop.path(".topipe").exists() && !shop.path("topipe-out").exists());
+}
+
+#[test]
+fn the_summary_tells_states_outputs_and_figures() {
+    let shop = Workshop::new();
+    let ended = shop.topipe(&["run", "box.toml"]);
+    for part in ["box (", "smooth  smoothing", "smooth.stl   written, ", "topipe-out/box", "check\n"] {
+        assert!(ended.stdout.contains(part), "no `{part}` in\n{}", ended.stdout);
+    }
+    assert_eq!(shop.topipe(&["run", "box.toml", "-q"]).stdout, "");
+}
+
+#[test]
+fn a_mistake_in_the_pipeline_is_exit_code_2_and_nothing_has_run() {
+    let shop = Workshop::new();
+    shop.edit("detect_planes", "detect_plains");
+    let ended = shop.topipe(&["run", "box.toml"]);
+    assert_eq!(ended.code, 2);
+    assert_eq!(
+        ended.stderr,
+        "error: unknown field `detect_plains` in stage `smooth` (smoothing)\n  --> box.toml:12:1\n   |\n\
+         12 | detect_plains = false\n   | ^^^^^^^^^^^^^\n   = help: did you mean `detect_planes`?\n"
+    );
+    assert!(!shop.path(".topipe").exists() && !shop.path("topipe-out").exists());
+}
+
+#[test]
+fn a_value_out_of_range_is_found_before_anything_runs() {
+    let shop = Workshop::new();
+    let ended = shop.topipe(&["run", "box.toml", "--set", "smooth.lambda=7"]);
+    assert_eq!(ended.code, 2);
+    assert!(ended.stderr.contains("--> command line:1:21\n"), "{}", ended.stderr);
+    assert!(!shop.path(".topipe").exists());
+}
+
+#[test]
+fn wrong_command_lines_are_exit_code_2() {
+    let shop = Workshop::new();
+    for arguments in [
+        &["run"][..],
+        &["run", "none.toml"],
+        &["run", "box.toml", "--set", "smooth"],
+        &["run", "box.toml", "--until", "smoth"],
+        &["run", "box.toml", "--jobs", "0"],
+        &["run", "box.toml", "--only", "check"],
+        &["stages", "smothing"],
+        &["fly"],
+    ] {
+        let ended = shop.topipe(arguments);
+        assert_eq!(ended.code, 2, "{arguments:?}: {}", ended.stderr);
+        assert!(ended.stderr.contains("error: "), "{arguments:?}: {}", ended.stderr);
+    }
+}
+
+#[test]
+fn refused_geometry_is_exit_code_3() {
+    let shop = Workshop::new();
+    let closed = box_off(1);
+    // Without its last face the box is open.
+    let lines: Vec<&str> = closed.lines().collect();
+    let open =
+        closed.replacen("8 6 0", "8 5 0", 1).lines().take(lines.len() - 1).collect::<Vec<_>>().join("\n");
+    shop.write("box.off", &open);
+    let ended = shop.topipe(&["run", "box.toml"]);
+    assert_eq!(ended.code, 3, "{}", ended.stderr);
+    assert!(
+        ended.stderr.starts_with("error: stage `mesh`: box.off: the surface is not closed"),
+        "{}",
+        ended.stderr
+    );
+}
+
+#[test]
+fn missing_files_and_unusable_folders_are_exit_code_4() {
+    let shop = Workshop::new();
+    shop.write("file", "");
+    assert_eq!(shop.topipe(&["run", "box.toml", "--out", "file"]).code, 4);
+    assert_eq!(shop.topipe(&["run", "box.toml", "--cache", "file"]).code, 4);
+    std::fs::remove_file(shop.path("box.off")).unwrap();
+    let ended = shop.topipe(&["run", "box.toml"]);
+    assert_eq!(ended.code, 4);
+    assert!(ended.stderr.contains("--> box.toml:6:8"), "{}", ended.stderr);
+}
+
+#[test]
+fn damage_in_the_cache_is_reported_and_repaired() {
+    let shop = Workshop::new();
+    shop.events(&[]);
+    let artifacts = files_below(&shop.path(".topipe/artifacts-v1"));
+    assert_eq!(artifacts.len(), 3);
+    for artifact in &artifacts {
+        let bytes = std::fs::read(artifact).unwrap();
+        std::fs::write(artifact, &bytes[..bytes.len() / 2]).unwrap();
+    }
+    let ended = shop.topipe(&["cache", "verify"]);
+    assert_eq!(ended.code, 4);
+    assert!(ended.stdout.starts_with("0 files are good, 6 were damaged"), "{}", ended.stdout);
+    std::fs::remove_dir_all(shop.path("topipe-out")).unwrap();
+    assert_eq!(shop.events(&[]), EVERYTHING);
+    assert_eq!(shop.topipe(&["cache", "verify"]).code, 0);
+}
+
+#[test]
+fn the_same_input_gives_the_same_bytes_in_another_place() {
+    let names = |threads: &str| {
+        let shop = Workshop::new();
+        let ended = shop.topipe(&["run", "box.toml", "--jobs", threads]);
+        assert_eq!(ended.code, 0, "{}", ended.stderr);
+        let cache = shop.path(".topipe");
+        let names: Vec<PathBuf> = ["artifacts-v1", "keys-v1"]
+            .iter()
+            .flat_map(|bucket| files_below(&cache.join(bucket)))
+            .map(|file| file.strip_prefix(&cache).unwrap().to_owned())
+            .collect();
+        (names, std::fs::read(shop.path("topipe-out/box/report.json")).unwrap())
+    };
+    let one = names("1");
+    assert_eq!(one.0.len(), 6);
+    assert_eq!(one, names("2"));
+    assert_eq!(one, names("8"));
+}
+
+/// Every parameter of every kind must be able to change the key: the engine hashes what `topipe stages` lists, so
+/// each field must be part of the defaults that are hashed.
+#[test]
+fn every_field_of_every_kind_is_documented_and_part_of_the_key() {
+    let shop = Workshop::new();
+    let schema: Value = serde_json::from_str(&shop.topipe(&["schema"]).stdout).unwrap();
+    let kinds = schema["properties"]["stage"]["additionalProperties"]["oneOf"].as_array().unwrap();
+    assert_eq!(kinds.len(), 7);
+    for kind in kinds {
+        let name = kind["title"].as_str().unwrap();
+        let shown = shop.topipe(&["stages", name]).stdout;
+        for (field, property) in kind["properties"].as_object().unwrap() {
+            assert!(shown.contains(&format!("{field} = ")), "{name} does not show {field}:\n{shown}");
+            let documented =
+                property.get("description").and_then(Value::as_str).is_some_and(|doc| !doc.is_empty());
+            assert!(documented, "{name}.{field} is not documented");
+            let is_reference = property["type"] == "string" && property.get("default").is_none();
+            let hashed = property.get("default").is_some() || field == "kind" || is_reference;
+            assert!(hashed, "{name}.{field} has no default, so it may be missing from the key");
+        }
+    }
+}
+
+#[test]
+fn a_new_pipeline_is_a_good_one() {
+    let shop = Workshop::new();
+    let ended = shop.topipe(&["new", "box.off", "-o", "fresh.toml"]);
+    assert_eq!(ended.code, 0, "{}", ended.stderr);
+    assert_eq!(shop.topipe(&["plan", "fresh.toml"]).code, 0);
+    let again = shop.topipe(&["new", "box.off", "-o", "fresh.toml"]);
+    assert_eq!(again.code, 2);
+    assert!(again.stderr.contains("exists"), "{}", again.stderr);
+}
+
+#[test]
+fn graphs_name_stages_and_exports() {
+    let shop = Workshop::new();
+    let mermaid = shop.topipe(&["graph", "box.toml"]).stdout;
+    assert!(mermaid.starts_with("flowchart LR\n") && mermaid.contains("s0 -->|mesh| s1"), "{mermaid}");
+    let dot = shop.topipe(&["graph", "box.toml", "--format", "dot"]).stdout;
+    assert!(dot.starts_with("digraph") && dot.contains("label = \"report.json\""), "{dot}");
+}
+
+#[test]
+fn inspect_tells_what_is_in_a_mesh_and_in_a_result() {
+    let shop = Workshop::new();
+    let mesh = shop.topipe(&["inspect", "box.off"]).stdout;
+    assert!(mesh.contains("432 triangles, 218 vertices") && mesh.contains("genus 0"), "{mesh}");
+    assert_eq!(shop.topipe(&["inspect", "smooth", "--pipeline", "box.toml"]).code, 4);
+    shop.events(&[]);
+    let result = shop.topipe(&["inspect", "smooth", "--pipeline", "box.toml"]);
+    assert!(result.stdout.starts_with("mesh (version 1), "), "{result:?}");
+    assert_eq!(shop.topipe(&["inspect", "smoth", "--pipeline", "box.toml"]).code, 2);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_ends_with_130_and_the_next_one_finishes() {
+    let shop = Workshop::new();
+    shop.write("box.off", &box_off(60));
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
+        .current_dir(shop.folder.path())
+        // Far more iterations than fit into any patience.
+        .args([
+            "run",
+            "box.toml",
+            "--json",
+            "--set",
+            "smooth.iterations=100000000",
+            "--set",
+            "smooth.tolerance=0",
+        ])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut lines = std::io::BufRead::lines(std::io::BufReader::new(child.stdout.take().unwrap()));
+    assert!(lines.any(|line| line.unwrap().contains("\"stage-started\",\"stage\":\"smooth\"")));
+    let signalled = std::process::Command::new("kill").arg(child.id().to_string()).status().unwrap();
+    assert!(signalled.success());
+    let rest: Vec<String> = lines.map(Result::unwrap).collect();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:#?}");
+    assert!(rest.last().unwrap().contains("\"interrupted\""), "{rest:#?}");
+    assert!(files_below(&shop.path(".topipe/locks-v1")).is_empty());
+    let events = shop.events(&[]);
+    assert_eq!(events[1..3], ["stage-cached mesh", "stage-started smooth"]);
+}
+
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).into_iter().flatten() {
+        let path = entry.unwrap().path();
+        if path.is_dir() { files.extend(files_below(&path)) } else { files.push(path) }
+    }
+    files.sort();
+    files
+}
