@@ -15,6 +15,8 @@ pub(super) struct Piece {
     pub(super) tips: Vec<(usize, VertexId)>,
     /// The vertices of the interfaces, all of them.
     pub(super) rims: Vec<VertexId>,
+    /// The longest edge at each vertex: a plane further away can not cut one of its edges.
+    pub(super) longest_edge: Vec<f64>,
 }
 
 impl Piece {
@@ -65,6 +67,7 @@ impl Piece {
             own_faces: faces.len(),
             tips: Vec::new(),
             rims: Vec::new(),
+            longest_edge: Vec::new(),
         };
         for (i, interface) in sets.interfaces.iter().enumerate() {
             if !own(interface.half_edges[0]) {
@@ -85,6 +88,15 @@ impl Piece {
         }
         piece.mesh = TriangleMesh { positions, triangles };
         piece.connectivity = Connectivity::build(&piece.mesh)?;
+        piece.longest_edge = vec![0.0; piece.mesh.vertex_count()];
+        for h in piece.connectivity.edges() {
+            let ends = [piece.connectivity.origin(h), piece.connectivity.target(h)];
+            let length = piece.mesh.position(ends[0]).distance(piece.mesh.position(ends[1]));
+            for v in ends {
+                let longest = &mut piece.longest_edge[v.index()];
+                *longest = longest.max(length);
+            }
+        }
         Ok(piece)
     }
 }

@@ -73,11 +73,12 @@ impl<'a> Cutter<'a> {
         let height = |v: VertexId| (piece.mesh.position(v) - origin).dot(normal);
         let mut best: Option<(bool, f64, Loop)> = None;
         for &v in vertices {
-            if height(v) > 0.0 {
+            let h = height(v);
+            if h > 0.0 || h < -piece.longest_edge[v.index()] {
                 continue;
             }
             // Far vertices belong to other windings of the same branch.
-            if piece.mesh.position(v).distance_squared(origin) > 16.0 * near * near {
+            if piece.mesh.position(v).distance_squared(origin) > 4.0 * near * near {
                 continue;
             }
             for h in piece.connectivity.outgoing(v) {
