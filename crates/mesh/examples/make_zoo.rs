@@ -211,6 +211,12 @@ fn main() -> std::io::Result<()> {
     let mut pillow = cube();
     pillow.faces = vec![vec![0, 1, 3], vec![0, 3, 1]];
     write("pillow.off", pillow.off().as_bytes())?;
+    let crossing = cube().with(Mesh::cube([0.3, 0.4, 0.55], 1.0));
+    write("crossing-cubes.off", crossing.off().as_bytes())?;
+    let mut spike = cube();
+    // A corner is pulled through the opposite side.
+    spike.points[7] = [0.4, 0.45, -0.5];
+    write("spike-through-side.off", spike.off().as_bytes())?;
     let mut flap = cube();
     flap.points.push([3.0, 3.0, 0.5]);
     flap.faces.extend([vec![3, 7, 8], vec![7, 3, 8]]);

@@ -66,6 +66,34 @@ proptest! {
         prop_assert!((part.mesh.area() - (6 * cells.len() - 2 * inner) as f64).abs() < 1e-9);
     }
 
+    #[test]
+    fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..600), kind in 0usize..5) {
+        let name = ["a.stl", "a.off", "a.obj", "a.ply", "a"][kind];
+        let start: &[u8] = [b"solid x\nfacet ".as_slice(), b"OFF\n3 1 0\n", b"v 1 2 3\nf ", b"ply\nformat ascii 1.0\n", b""][kind];
+        let _ = read(name, &bytes, &all());
+        let _ = read(name, &[start, &bytes].concat(), &all());
+    }
+
+    /// Files with some bytes changed, cut or repeated either give a part that keeps all promises or a named refusal.
+    #[test]
+    fn damaged_files_never_panic(which in 0usize..14, edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6), cut in any::<prop::sample::Index>(), shorten in any::<bool>()) {
+        let name = ["binary.stl", "ascii.stl", "cube.off", "cube.obj", "tetrahedron.ply", "touching-pillars.off",
+            "checkered-voxels.off", "nested-shells.off", "klein-bottle.off", "bow-tie-vertex.off", "zero-area-face.off",
+            "two-components.off", "duplicate-faces.off", "cubes-sharing-edge.off"][which];
+        let mut bytes = fixture(&format!("zoo/{name}"));
+        for (place, value) in edits {
+            let k = place.index(bytes.len());
+            // Digits stay digits half of the time, so that damage gets past the parser.
+            bytes[k] = if bytes[k].is_ascii_digit() && value < 128 { b'0' + value % 10 } else { value };
+        }
+        if shorten { bytes.truncate(cut.index(bytes.len())); }
+        if let Ok(part) = read(name, &bytes, &all()) { check(&part); }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
     /// The order of faces, where each starts, its direction and the numbers of the vertices do not matter.
     #[test]
     fn order_and_numbering_do_not_matter(seed in any::<u64>()) {
@@ -108,29 +136,32 @@ proptest! {
             prop_assert_eq!(part.mesh.positions[v], mesh.positions[from.index()]);
         }
     }
+}
 
-    #[test]
-    fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..600), kind in 0usize..5) {
-        let name = ["a.stl", "a.off", "a.obj", "a.ply", "a"][kind];
-        let start: &[u8] = [b"solid x\nfacet ".as_slice(), b"OFF\n3 1 0\n", b"v 1 2 3\nf ", b"ply\nformat ascii 1.0\n", b""][kind];
-        let _ = read(name, &bytes, &all());
-        let _ = read(name, &[start, &bytes].concat(), &all());
-    }
-
-    /// Files with some bytes changed, cut or repeated either give a part that keeps all promises or a named refusal.
-    #[test]
-    fn damaged_files_never_panic(which in 0usize..14, edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6), cut in any::<prop::sample::Index>(), shorten in any::<bool>()) {
-        let name = ["binary.stl", "ascii.stl", "cube.off", "cube.obj", "tetrahedron.ply", "touching-pillars.off",
-            "checkered-voxels.off", "nested-shells.off", "klein-bottle.off", "bow-tie-vertex.off", "zero-area-face.off",
-            "two-components.off", "duplicate-faces.off", "cubes-sharing-edge.off"][which];
-        let mut bytes = fixture(&format!("zoo/{name}"));
-        for (place, value) in edits {
-            let k = place.index(bytes.len());
-            // Digits stay digits half of the time, so that damage gets past the parser.
-            bytes[k] = if bytes[k].is_ascii_digit() && value < 128 { b'0' + value % 10 } else { value };
-        }
-        if shorten { bytes.truncate(cut.index(bytes.len())); }
-        if let Ok(part) = read(name, &bytes, &all()) { check(&part); }
+/// Two cubes, one moved: they are refused exactly when they pass through each other.
+#[test]
+fn bodies_that_cross_are_refused_unless_allowed() {
+    let cube = read("cube.off", &fixture("zoo/cube.off"), &all()).unwrap().mesh;
+    let moved = |by: DVec3| {
+        let mut both = cube.clone();
+        let first = both.vertex_count() as u32;
+        both.positions.extend(cube.positions.iter().map(|p| *p + by));
+        both.triangles.extend(cube.triangles.iter().map(|t| t.map(|v| topipe_mesh::VertexId(v.0 + first))));
+        let mut bytes = Vec::new();
+        write::ply(&both, &mut bytes).unwrap();
+        bytes
+    };
+    for (by, crosses) in [
+        (DVec3::new(0.2, 0.3, 0.4), true),
+        (DVec3::new(0.999, -0.3, 0.4), true),
+        (DVec3::new(1.0, -0.3, 0.4), false),
+        (DVec3::new(1.001, 0.3, 0.4), false),
+    ] {
+        let result = read("cubes.ply", &moved(by), &all());
+        assert_eq!(matches!(result, Err(ImportError::SelfIntersection { .. })), crosses, "{by} {result:?}");
+        let options = ImportOptions { allow_self_intersection: true, ..all() };
+        let part = read("cubes.ply", &moved(by), &options).unwrap();
+        assert!((part.mesh.volume() - 2.0).abs() < 1e-12);
     }
 }
 

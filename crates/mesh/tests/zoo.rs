@@ -59,6 +59,7 @@ const LARGEST: &[(&str, &str)] = &[
     ("carriage-returns.stl", "STL (ASCII): 8 vertices, 12 faces, genus 0, 1 shell(s), volume 1.000000"),
     ("checkered-voxels.off", "OFF: 8 vertices, 12 faces, genus 0, 1 shell(s), volume 1.000000; 48 welded vertices with equal coordinates; 36 took apart edges with more than two faces; 48 copied vertices where the surface touches itself; 13 dropped smaller components"),
     ("counts-in-header-line.off", "OFF: 8 vertices, 12 faces, genus 0, 1 shell(s), volume 1.000000"),
+    ("crossing-cubes.off", "OFF: 8 vertices, 12 faces, genus 0, 1 shell(s), volume 1.000000; 1 dropped smaller components"),
     ("cube.obj", "OBJ: 8 vertices, 12 faces, genus 0, 1 shell(s), volume 1.000000; 6 triangles added for faces with more than three corners"),
     ("cube.off", "OFF: 8 vertices, 12 faces, genus 0, 1 shell(s), volume 1.000000"),
     ("cubes-other-diagonal.off", "cubes-other-diagonal.off: faces 10 and 20 lie on each other at (1, 0.5, 0); unite the touching bodies in the program that made the mesh"),
@@ -93,6 +94,7 @@ const LARGEST: &[(&str, &str)] = &[
     ("repeated-corner.off", "OFF: 8 vertices, 12 faces, genus 0, 1 shell(s), volume 1.000000; 1 dropped faces with a repeated corner"),
     ("solid-header.stl", "STL (binary): 8 vertices, 12 faces, genus 0, 1 shell(s), volume 1.000000"),
     ("solid-in-cavity.off", "OFF: 16 vertices, 24 faces, genus 0, 2 shell(s), volume 98.000000; 1 turned shells that were inside out; 1 dropped smaller components"),
+    ("spike-through-side.off", "spike-through-side.off: the surface passes through itself in 5 place(s), the first at (0.3, 0.3, 0) between faces 0 and 2; unite the bodies in the program that made the mesh, or set allow_self_intersection"),
     ("t-junction.off", "t-junction.off: the surface is not closed: it has 1 border; the longest, 3 edges and 2.0000 long, passes (0.5, 0, 0) beside face 4; close the holes in the program that made the mesh; nothing is missing there, but its two sides do not share their vertices; where these nearly coincide, weld_tolerance helps"),
     ("tetrahedron.ply", "PLY (ASCII): 4 vertices, 4 faces, genus 0, 1 shell(s), volume 0.166667"),
     ("text.stl", "text.stl: this is not a mesh that can be read; STL, OFF, OBJ and PLY can"),
@@ -116,6 +118,7 @@ const LARGEST: &[(&str, &str)] = &[
 const ALL: &[(&str, &str)] = &[
     ("bow-tie-vertex.off", "OFF: 8 vertices, 8 faces, genus 0, 2 shell(s), volume 1.000000; 1 copied vertices where the surface touches itself"),
     ("checkered-voxels.off", "OFF: 112 vertices, 168 faces, genus 0, 14 shell(s), volume 14.000000; 48 welded vertices with equal coordinates; 36 took apart edges with more than two faces; 48 copied vertices where the surface touches itself"),
+    ("crossing-cubes.off", "crossing-cubes.off: the surface passes through itself in 12 place(s), the first at (1, 0.4, 1) between faces 2 and 16; unite the bodies in the program that made the mesh, or set allow_self_intersection"),
     ("cubes-sharing-edge.off", "OFF: 16 vertices, 24 faces, genus 0, 2 shell(s), volume 2.000000; 2 welded vertices with equal coordinates; 1 took apart edges with more than two faces; 2 copied vertices where the surface touches itself"),
     ("cubes-sharing-vertex.off", "OFF: 16 vertices, 24 faces, genus 0, 2 shell(s), volume 2.000000; 1 welded vertices with equal coordinates; 1 copied vertices where the surface touches itself"),
     ("solid-in-cavity.off", "OFF: 24 vertices, 36 faces, genus 0, 3 shell(s), volume 99.000000; 1 turned shells that were inside out"),

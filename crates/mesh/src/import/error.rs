@@ -142,6 +142,23 @@ pub enum ImportError {
         /// Where.
         point: DVec3,
     },
+    /// The surface passes through itself.
+    #[error(
+        "{file}: the surface passes through itself in {pairs} place(s), the first at {} between faces {first} and \
+         {second}; unite the bodies in the program that made the mesh, or set allow_self_intersection", at(.point)
+    )]
+    SelfIntersection {
+        /// The file.
+        file: String,
+        /// Pairs of faces that cross.
+        pairs: usize,
+        /// One face of the first pair.
+        first: u32,
+        /// The other.
+        second: u32,
+        /// Where they cross.
+        point: DVec3,
+    },
     /// A one-sided surface.
     #[error(
         "{file}: the surface has only one side (like a Moebius strip): faces {first} and {second} can not be \

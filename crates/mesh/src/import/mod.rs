@@ -10,7 +10,7 @@
 //! Repairs are made only where there is one reasonable answer, and each is counted in
 //! [`ImportRecord::repairs`](crate::ImportRecord::repairs). Holes are not filled.
 //!
-//! Non-guarantees: the surface may still cross itself away from its edges, and may have badly shaped triangles.
+//! Non-guarantees: triangles may be badly shaped, and faces may touch or overlap within one plane.
 //!
 //! ```
 //! let cube = "OFF 8 6 0
@@ -22,6 +22,7 @@
 //! ```
 
 mod border;
+mod crossing;
 mod draft;
 mod error;
 mod format;
@@ -96,6 +97,13 @@ pub fn read_source(
             Some(labels)
         }
     };
+    if soup.triangles.len() >= (u32::MAX / 3) as usize {
+        return Err(ImportError::TooLarge {
+            file: file.to_owned(),
+            count: 3 * soup.triangles.len(),
+            what: "half-edges",
+        });
+    }
     progress.check()?;
 
     progress.step(1, STEPS, "welding");
@@ -119,6 +127,9 @@ pub fn read_source(
     progress.check()?;
     shells::select(file, &mut draft, &connectivity, options.components)?;
     slivers::flip_slivers(&mut draft);
+    if !options.allow_self_intersection {
+        crossing::refuse_crossings(file, &draft)?;
+    }
     progress.check()?;
 
     progress.step(3, STEPS, "labelling");

@@ -90,6 +90,8 @@ pub struct ImportOptions {
     /// Vertices nearer than this fraction of the bounding box's diagonal become one. 0 (default): only equal
     /// coordinates, which is right for every file in which neighbouring triangles share their corners exactly.
     pub weld_tolerance: f64,
+    /// Accept a surface that passes through itself; false by default, as it bounds no solid that CAD would accept.
+    pub allow_self_intersection: bool,
     /// Regions of space in which faces are non-design, besides those of the label file.
     pub non_design: Vec<NonDesignRegion>,
     /// Slack of the regions, as a fraction of the bounding box's diagonal. 1e-6 (default) covers the rounding of
@@ -104,6 +106,7 @@ impl Default for ImportOptions {
             scale: 1.0,
             components: Components::Largest,
             weld_tolerance: 0.0,
+            allow_self_intersection: false,
             non_design: Vec::new(),
             region_tolerance: 1e-6,
         }

@@ -220,6 +220,36 @@ impl SurfaceIndex {
         odd as usize * 2 > DIRECTIONS.len()
     }
 
+    /// Hands all faces whose box meets the box `low`, `high` to `visit`.
+    pub(crate) fn faces_near_box(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(FaceId)) {
+        let meets = |n: &Node| n.low.cmple(high).all() && n.high.cmpge(low).all();
+        if !self.nodes.first().is_some_and(meets) {
+            return;
+        }
+        let mut stack = [0u32; STACK];
+        let mut depth = 1;
+        while depth > 0 {
+            depth -= 1;
+            let node = &self.nodes[stack[depth] as usize];
+            if node.count > 0 {
+                for slot in node.first as usize..(node.first + node.count) as usize {
+                    let [a, b, c] = self.corners[slot];
+                    let beside = a.min(b).min(c).cmpgt(high).any() || a.max(b).max(c).cmplt(low).any();
+                    if !beside {
+                        visit(self.faces[slot]);
+                    }
+                }
+                continue;
+            }
+            for child in [node.first + 1, node.first] {
+                if meets(&self.nodes[child as usize]) {
+                    stack[depth] = child;
+                    depth += 1;
+                }
+            }
+        }
+    }
+
     /// Hands the triangles of all leaves that the ray enters before `limit` to `visit`, nearer boxes first, until it
     /// returns false. `visit` may lower the limit.
     fn visit_ray(
