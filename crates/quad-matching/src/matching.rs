@@ -22,8 +22,8 @@ pub(crate) struct Diagonal {
     pub(crate) penalty: f64,
 }
 
-/// As much as a corner of 178 degrees: quads across features are taken only when nothing else is left.
-const FEATURE_PENALTY: f64 = 1e5;
+/// More than a corner of 180 degrees: quads across features are taken only when nothing else is left.
+const FEATURE_PENALTY: f64 = 5e5;
 /// As much as a corner of 172 degrees, for each round in which removing an edge left a doublet.
 pub(crate) const DOUBLET_PENALTY: f64 = 3e4;
 /// Weights are integers; a thousandth of the harmonic energy (8 for a square) is resolved.

@@ -27,6 +27,10 @@ struct Site {
     along: Vec<(FaceId, f64)>,
 }
 
+/// Distances along a feature curve count by this factor: tiles of the curve's sites reach along it before others
+/// reach it from the side. With 1 a third of the bracket's segments were cut off by a third tile, with 0.5 a tenth.
+const ALONG: f64 = 0.5;
+
 struct Tessellation<'a> {
     refiner: Refiner,
     growth: Growth,
@@ -164,6 +168,15 @@ impl Tessellation<'_> {
                 site_of.insert(vertex, site);
             }
         }
+        let whole = segments
+            .iter()
+            .filter(|s| site_of.contains_key(&s.path[0]) && site_of.contains_key(&s.path[s.path.len() - 1]))
+            .count();
+        self.progress.remark(&format!(
+            "{} anchors on feature curves; {whole} of {} segments have both ends",
+            site_of.len(),
+            segments.len()
+        ));
         for segment in segments {
             let ends = [segment.path[0], segment.path[segment.path.len() - 1]];
             let [Some(&a), Some(&b)] = ends.map(|v| site_of.get(&v)) else { continue };
@@ -173,24 +186,60 @@ impl Tessellation<'_> {
                 (b, segment.path[crossing..].iter().rev().copied().collect()),
             ];
             for (site, path) in halves {
-                let mut along = Vec::new();
-                let mut reach = 0.0;
-                for pair in path.windows(2) {
-                    let at = |v: VertexId| self.refiner.part().mesh.position(v);
-                    if let Some(h) = self.refiner.half_edge(pair[0], pair[1]) {
-                        along.push((h.face(), reach));
-                        along.push((self.refiner.twin(h).face(), reach));
-                    }
-                    reach += at(pair[0]).distance(at(pair[1]));
-                    if pair[1] != path[path.len() - 1] {
-                        along.extend(
-                            self.growth.star(&self.refiner, pair[1]).iter().map(|&(f, d)| (f, reach + d)),
-                        );
-                    }
-                }
+                let along = self.along(&path);
                 self.sites[site as usize].along.extend(along);
             }
+            let around = self.around_crossing(&segment.path, crossing);
+            for (site, faces) in [a, b].into_iter().zip(around) {
+                self.sites[site as usize].along.extend(faces);
+            }
         }
+    }
+
+    /// The faces along half a segment, from its site to the crossing, with their distances.
+    fn along(&self, path: &[VertexId]) -> Vec<(FaceId, f64)> {
+        let at = |v: VertexId| self.refiner.part().mesh.position(v);
+        let mut along = Vec::new();
+        let mut reach = 0.0;
+        for (k, pair) in path.windows(2).enumerate() {
+            if let Some(h) = self.refiner.half_edge(pair[0], pair[1]) {
+                along.push((h.face(), reach));
+                along.push((self.refiner.twin(h).face(), reach));
+            }
+            reach += ALONG * at(pair[0]).distance(at(pair[1]));
+            if k + 2 < path.len() {
+                along.extend(
+                    self.growth.star(&self.refiner, pair[1]).iter().map(|&(f, d)| (f, reach + ALONG * d)),
+                );
+            }
+        }
+        along
+    }
+
+    /// The faces around the crossing of a segment: on either side of the curve the nearer half of them for each of
+    /// the two sites, so that no third tile reaches the curve there.
+    fn around_crossing(&self, path: &[VertexId], crossing: usize) -> [Vec<(FaceId, f64)>; 2] {
+        let at = |v: VertexId| self.refiner.part().mesh.position(v);
+        let reach = |range: &[VertexId]| -> f64 {
+            range.windows(2).map(|w| ALONG * at(w[0]).distance(at(w[1]))).sum()
+        };
+        let reaches = [reach(&path[..=crossing]), reach(&path[crossing..])];
+        let mut faces = [Vec::new(), Vec::new()];
+        let fan = self.refiner.outgoing(path[crossing]);
+        let position = |v: VertexId| fan.iter().position(|&h| self.refiner.target(h) == v);
+        let (Some(before), Some(after)) = (position(path[crossing - 1]), position(path[crossing + 1])) else {
+            return faces;
+        };
+        // Counter-clockwise from one branch of the curve to the other, and on.
+        for (from, to, sites) in [(before, after, [0, 1]), (after, before, [1, 0])] {
+            let count = (to + fan.len() - from) % fan.len();
+            for k in 0..count {
+                let face = fan[(from + k) % fan.len()].face();
+                let site = sites[(2 * k >= count) as usize];
+                faces[site].push((face, reaches[site]));
+            }
+        }
+        faces
     }
 
     /// Farthest-point seeding: the face farthest from all sites gets the next one, until every face is within
