@@ -1,28 +1,16 @@
-//! Smooths OFF files and prints what was found and how the surface changed.
+//! Smooths mesh files and prints what was found and how the surface changed.
 //!
-//! `cargo run --release -p topipe-smoothing --example measure -- CASE.off ...`, with `CASE.labels.csv` beside each.
+//! `cargo run --release -p topipe-smoothing --example measure -- CASE.stl ...`, with `CASE.labels.csv` beside each.
+//! Options apply to the files after them.
 //! With `--write DIR`, the result of each is written there, with one line per face saying its region.
 
 use std::fmt::Write as _;
+use std::path::Path;
 use std::time::Instant;
-use topipe_mesh::{Connectivity, Design, Part, RegionShape, TriangleMesh};
+use topipe_mesh::import::{ImportOptions, Source, read_source};
+use topipe_mesh::{Connectivity, Part, RegionShape, TriangleMesh};
 use topipe_progress::Progress;
 use topipe_smoothing::{Method, Parameters, smooth};
-
-fn read_off(text: &str) -> TriangleMesh {
-    let mut numbers = text.split_ascii_whitespace().skip(1);
-    let mut next = || numbers.next().expect("a complete OFF file");
-    let (vertices, faces) = (next().parse().expect("count"), next().parse().expect("count"));
-    next();
-    let positions = (0..vertices).map(|_| [(); 3].map(|_| next().parse().expect("coordinate"))).collect();
-    let triangles = (0..faces)
-        .map(|_| {
-            next();
-            [(); 3].map(|_| next().parse().expect("index"))
-        })
-        .collect();
-    TriangleMesh::from_arrays(positions, triangles)
-}
 
 /// Faces whose normal is more than 120 degrees from the mean of their neighbours', and the dihedral histogram.
 fn quality(mesh: &TriangleMesh) -> String {
@@ -119,15 +107,15 @@ fn main() {
 }
 
 fn case(path: &str, parameters: &Parameters, write: Option<&str>) {
-    let mesh = read_off(&std::fs::read_to_string(path).expect("a readable file"));
-    let mut part = Part::new(mesh);
-    if let Ok(labels) = std::fs::read_to_string(path.replace(".off", ".labels.csv")) {
-        for (design, label) in part.design.iter_mut().zip(labels.split_ascii_whitespace()) {
-            if label == "1" {
-                *design = Design::NonDesign;
-            }
-        }
-    }
+    let bytes = std::fs::read(path).expect("a readable file");
+    let labels = Path::new(path).with_extension("labels.csv");
+    let labels = std::fs::read(labels).ok();
+    let mut source = Source::new(path, &bytes);
+    source.labels = labels.as_deref().map(|l| ("labels", l));
+    let part = match read_source(&source, &ImportOptions::default(), &Progress::silent()) {
+        Ok(part) => part,
+        Err(error) => return println!("{path}: {error}"),
+    };
     println!("{path}: {} faces", part.mesh.face_count());
     let start = Instant::now();
     let smoothed = match smooth(&part, parameters, &Progress::silent()) {
@@ -177,7 +165,8 @@ fn case(path: &str, parameters: &Parameters, write: Option<&str>) {
         for t in &smoothed.mesh.triangles {
             let _ = writeln!(text, "3 {} {} {}", t[0].0, t[1].0, t[2].0);
         }
-        std::fs::write(format!("{directory}/{name}"), text).expect("a writable directory");
+        std::fs::write(format!("{directory}/{}", name.replace(".stl", ".off")), text)
+            .expect("a writable directory");
         let regions: String = smoothed.region_of_face.iter().map(|r| format!("{}\n", r.0 as i32)).collect();
         std::fs::write(format!("{directory}/{name}.regions"), regions).expect("a writable directory");
         let edges: String = smoothed

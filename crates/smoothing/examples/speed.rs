@@ -1,28 +1,14 @@
 //! Time per iteration of each method, without and with detection and volume, at growing sizes.
 //!
-//! `cargo run --release -p topipe-smoothing --example speed -- [MESH.off] [--detection]`: the mesh (a sphere of 32,768 triangles if none
+//! `cargo run --release -p topipe-smoothing --example speed -- [MESH.stl] [--detection]`: the mesh (a sphere of 32,768 triangles if none
 //! is given) is subdivided until it has over a million triangles.
 
 use std::collections::HashMap;
 use std::time::Instant;
+use topipe_mesh::import::{ImportOptions, read};
 use topipe_mesh::{DVec3, Part, TriangleMesh, VertexId};
 use topipe_progress::Progress;
 use topipe_smoothing::{Method, Parameters, smooth};
-
-fn read_off(text: &str) -> TriangleMesh {
-    let mut numbers = text.split_ascii_whitespace().skip(1);
-    let mut next = || numbers.next().expect("a complete OFF file");
-    let (vertices, faces) = (next().parse().expect("count"), next().parse().expect("count"));
-    next();
-    let positions = (0..vertices).map(|_| [(); 3].map(|_| next().parse().expect("coordinate"))).collect();
-    let triangles = (0..faces)
-        .map(|_| {
-            next();
-            [(); 3].map(|_| next().parse().expect("index"))
-        })
-        .collect();
-    TriangleMesh::from_arrays(positions, triangles)
-}
 
 fn octahedron() -> TriangleMesh {
     TriangleMesh::from_arrays(
@@ -64,7 +50,10 @@ fn shake(mesh: &mut TriangleMesh) {
 
 fn main() {
     let mut mesh = match std::env::args().nth(1) {
-        Some(path) => read_off(&std::fs::read_to_string(path).expect("a readable file")),
+        Some(path) => {
+            let bytes = std::fs::read(&path).expect("a readable file");
+            read(&path, &bytes, &ImportOptions::default()).expect("a readable mesh").mesh
+        }
         None => (0..6).fold(octahedron(), |mesh, _| {
             let mut finer = subdivide(&mesh);
             finer.positions.iter_mut().for_each(|p| *p = p.normalize());

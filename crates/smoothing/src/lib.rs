@@ -14,7 +14,8 @@
 //! - Frozen vertices keep their bits.
 //! - With volume preservation (the default of HC-SDU) the volume differs by at most 1e-12 of itself after the last
 //!   iteration. No origin and no axis enters: the correction is an offset along the free vertices' normals.
-//! - The outline of a flat face slides in its plane and does not leave it by more than rounding.
+//! - The outline of a flat face slides in its plane and does not leave it by more than rounding; no triangle of a flat
+//!   face turns over.
 //! - The result has the connectivity of the input, and is the same bits for any number of threads. Up to rounding it
 //!   does not depend on position, orientation, unit or numbering of the mesh.
 //!
@@ -43,6 +44,7 @@ mod error;
 pub mod features;
 mod kernel;
 mod methods;
+mod outline;
 mod parameters;
 mod smooth;
 mod volume;

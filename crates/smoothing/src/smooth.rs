@@ -3,6 +3,7 @@
 use crate::features::{self, Features};
 use crate::kernel::{Domain, Slide, change};
 use crate::methods;
+use crate::outline::OutlineGuard;
 use crate::volume::VolumeKeeper;
 use crate::{Method, Parameters, SmoothingError};
 use topipe_mesh::{Connectivity, Design, FeatureKind, Part, RegionId, SmoothingRecord};
@@ -44,7 +45,7 @@ pub fn smooth(part: &Part, parameters: &Parameters, progress: &Progress) -> Resu
         record.converged = true;
     } else {
         let domain = domain(&connectivity, &features, &frozen, mesh.vertex_count());
-        iterate(part, &connectivity, &domain, parameters, progress, &mut result, &mut record)?;
+        iterate(part, &connectivity, &features, &domain, parameters, progress, &mut result, &mut record)?;
     }
     let solid: Vec<bool> = mesh.triangles.iter().map(|t| t.iter().all(|v| frozen[v.index()])).collect();
     features.measure(&result.mesh);
@@ -133,6 +134,7 @@ fn domain(connectivity: &Connectivity, features: &Features, frozen: &[bool], ver
 fn iterate(
     part: &Part,
     connectivity: &Connectivity,
+    features: &Features,
     domain: &Domain,
     parameters: &Parameters,
     progress: &Progress,
@@ -163,6 +165,7 @@ fn iterate(
         }
     }
     let mut step = methods::choose(parameters, domain, original);
+    let guard = OutlineGuard::new(mesh, features, domain);
     let mut current = original.clone();
     let mut next = original.clone();
     let most = parameters.most_iterations();
@@ -170,6 +173,7 @@ fn iterate(
         progress.check()?;
         step.step(domain, original, &current, &mut next);
         domain.project(original, &mut next);
+        guard.hold(&current, &mut next);
         let volume = if parameters.keeps_volume() {
             keeper.restore(domain, &mut next, edge).map_err(|volume| SmoothingError::VolumeOutOfReach {
                 iteration,

@@ -106,6 +106,7 @@ fn flat_faces_stay_in_their_planes() {
                 continue;
             }
             let RegionShape::Plane { point, normal } = result.regions[id.index()].shape else { continue };
+            assert!(normal.dot(result.mesh.area_vector(f)) > 0.0, "{case}: {f:?} turned over");
             for v in part.mesh.triangles[f.index()] {
                 let height = normal.dot(result.mesh.position(v) - point).abs();
                 assert!(height <= result.regions[id.index()].residual);
@@ -226,4 +227,64 @@ fn any_number_of_threads_gives_the_same_bits() {
         assert_eq!(bits(&results[0]), bits(other));
         assert!(results[0] == *other);
     }
+}
+
+#[test]
+fn an_outline_does_not_pass_the_frozen_inside_of_its_face() {
+    // A prism whose top has a deep notch next to frozen vertices: straightening the outline would cross them.
+    let part = Part::new(notched_prism());
+    let parameters = Parameters { alpha: 0.0, tolerance: 0.0, ..Parameters::default() };
+    let result = smoothed(&part, &parameters);
+    let mut slid = 0;
+    for f in part.mesh.faces() {
+        let id = result.region_of_face[f.index()];
+        if !id.is_some() {
+            continue;
+        }
+        let RegionShape::Plane { normal, .. } = result.regions[id.index()].shape else { continue };
+        let (before, after) = (part.mesh.area_vector(f), result.mesh.area_vector(f));
+        assert!(normal.dot(after) >= 0.09 * normal.dot(before), "{f:?} turned over");
+        slid += usize::from(before != after);
+    }
+    assert!(slid > 10);
+}
+
+/// A solid of two height fields over a grid: flat on top within a ragged outline, wavy elsewhere.
+fn notched_prism() -> TriangleMesh {
+    let n = 24;
+    let mut noise = crate::Noise(9);
+    let at = |i: usize, j: usize| i * (n + 1) + j;
+    let layer = (n + 1) * (n + 1);
+    let mut positions = Vec::new();
+    for top in [true, false] {
+        for i in 0..=n {
+            for j in 0..=n {
+                let ragged = 4 + 3 * (j % 2) + (j % 3);
+                let flat = i > ragged && i < n - 2 && j > 2 && j < n - 2;
+                let bump = if flat { 0.0 } else { 0.6 + 0.3 * noise.next() };
+                let (x, y) = (i as f64, j as f64);
+                positions.push(if top { [x, y, 5.0 - bump] } else { [x, y, bump] });
+            }
+        }
+    }
+    let mut triangles: Vec<[usize; 3]> = Vec::new();
+    for i in 0..n {
+        for j in 0..n {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            triangles.extend([[a, b, c], [a, c, d]]);
+            triangles.extend([[layer + a, layer + c, layer + b], [layer + a, layer + d, layer + c]]);
+        }
+    }
+    for k in 0..n {
+        for (a, b) in [
+            (at(k, 0), at(k + 1, 0)),
+            (at(n, k), at(n, k + 1)),
+            (at(k + 1, n), at(k, n)),
+            (at(0, k + 1), at(0, k)),
+        ] {
+            triangles.extend([[a, layer + a, layer + b], [a, layer + b, b]]);
+        }
+    }
+    let triangles = triangles.into_iter().map(|t| t.map(|v| v as u32)).collect();
+    TriangleMesh::from_arrays(positions, triangles)
 }

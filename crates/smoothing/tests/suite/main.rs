@@ -7,9 +7,9 @@ mod invariance;
 mod methods;
 mod shapes;
 
-use std::collections::HashMap;
 use std::path::PathBuf;
-use topipe_mesh::{Design, Part, TriangleMesh};
+use topipe_mesh::Part;
+use topipe_mesh::import::{ImportOptions, Source, read_source};
 use topipe_progress::Progress;
 use topipe_smoothing::{Parameters, smooth};
 
@@ -31,29 +31,13 @@ fn file(case: &str, ending: &str) -> PathBuf {
     root.join(case).join(format!("{case}.{ending}"))
 }
 
-/// A case with its labels. Equal coordinates are one vertex, in order of appearance.
+/// A case with its labels.
 fn read(case: &str) -> Part {
     let bytes = std::fs::read(file(case, "stl")).expect("the fixture");
-    let mut vertices = HashMap::new();
-    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
-    for facet in bytes[84..].chunks_exact(50) {
-        triangles.push([0, 1, 2].map(|corner| {
-            let bits = [0, 1, 2].map(|axis| {
-                let at = 12 + 12 * corner + 4 * axis;
-                u32::from_le_bytes([facet[at], facet[at + 1], facet[at + 2], facet[at + 3]])
-            });
-            *vertices.entry(bits).or_insert_with(|| {
-                positions.push(bits.map(|b| f64::from(f32::from_bits(b))));
-                positions.len() as u32 - 1
-            })
-        }));
-    }
-    let mut part = Part::new(TriangleMesh::from_arrays(positions, triangles));
-    let labels = std::fs::read_to_string(file(case, "labels.csv")).expect("the labels");
-    for (design, label) in part.design.iter_mut().zip(labels.split_ascii_whitespace()) {
-        *design = if label == "1" { Design::NonDesign } else { Design::Design };
-    }
-    part
+    let labels = std::fs::read(file(case, "labels.csv")).expect("the labels");
+    let mut source = Source::new(case, &bytes);
+    source.labels = Some(("labels.csv", &labels));
+    read_source(&source, &ImportOptions::default(), &Progress::silent()).expect("a readable mesh")
 }
 
 /// What is known about a case.
