@@ -138,6 +138,44 @@ proptest! {
     }
 }
 
+/// Thousands of islands and shells in shells must not take the time of all pairs of them.
+#[test]
+fn many_shells_are_sorted_into_solids_and_cavities() {
+    let cube = read("cube.off", &fixture("zoo/cube.off"), &all()).unwrap().mesh;
+    let mut mesh = TriangleMesh::default();
+    let mut add = |center: DVec3, size: f64| {
+        let first = mesh.vertex_count() as u32;
+        mesh.positions.extend(cube.positions.iter().map(|p| center + (*p - 0.5) * size));
+        mesh.triangles.extend(cube.triangles.iter().map(|t| t.map(|v| topipe_mesh::VertexId(v.0 + first))));
+    };
+    // A nest of 40 shells around the origin, and 8,000 islands beside it.
+    for k in 1..=40 {
+        add(DVec3::ZERO, f64::from(k));
+    }
+    for k in 0..8000 {
+        add(DVec3::new(40.0 + f64::from(k % 20), f64::from(k / 20 % 20), f64::from(k / 400)), 0.5);
+    }
+    let mut bytes = Vec::new();
+    write::ply(&mesh, &mut bytes).unwrap();
+    let part = read("many.ply", &bytes, &all()).unwrap();
+    let connectivity = check(&part);
+    assert_eq!(connectivity.components().1, 8040);
+    let nest: f64 = (1..=40).map(|k| f64::powi(f64::from(k), 3) * if k % 2 == 0 { 1.0 } else { -1.0 }).sum();
+    assert!((part.mesh.volume() - nest - 8000.0 / 8.0).abs() < 1e-6);
+    // The largest keeps the cavity right inside it, and nothing else.
+    let part = read("many.ply", &bytes, &ImportOptions::default()).unwrap();
+    assert!((part.mesh.volume() - (f64::powi(40.0, 3) - f64::powi(39.0, 3))).abs() < 1e-6);
+    let repairs: Vec<_> = part.import.repairs.iter().map(|r| (r.what.as_str(), r.count)).collect();
+    assert_eq!(
+        repairs,
+        [
+            ("turned shells that were inside out", 1),
+            ("dropped smaller components", 8019),
+            ("dropped cavities of smaller components", 19)
+        ]
+    );
+}
+
 /// Two cubes, one moved: they are refused exactly when they pass through each other.
 #[test]
 fn bodies_that_cross_are_refused_unless_allowed() {

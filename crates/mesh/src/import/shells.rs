@@ -2,8 +2,8 @@
 
 use super::draft::Draft;
 use super::{Components, ImportError};
-use crate::spatial::SurfaceIndex;
-use crate::{Connectivity, TriangleMesh};
+use crate::spatial::{DIRECTIONS, SurfaceIndex};
+use crate::{Connectivity, FaceId, TriangleMesh};
 use glam::DVec3;
 
 /// One connected piece of the surface.
@@ -15,14 +15,6 @@ struct Shell {
 }
 
 impl Shell {
-    fn mesh(&self, whole: &TriangleMesh) -> TriangleMesh {
-        // Positions are shared by copy: only shells that enclose the box of another come here.
-        TriangleMesh {
-            positions: whole.positions.clone(),
-            triangles: self.faces.iter().map(|&f| whole.triangles[f as usize]).collect(),
-        }
-    }
-
     fn encloses_box(&self, other: &Self) -> bool {
         self.low.cmple(other.low).all() && self.high.cmpge(other.high).all()
     }
@@ -48,7 +40,7 @@ pub(super) fn select(
     if !solid.iter().any(|&s| s) {
         return Err(ImportError::NoVolume { file: file.to_owned() });
     }
-    let container = containers(&draft.mesh, &shells, &solid);
+    let container = containers(&draft.mesh, &shells, &shell_of, &solid);
     let depth = |mut s: usize| {
         let mut depth = 0;
         while let Some(outer) = container[s] {
@@ -97,7 +89,7 @@ fn measure(mesh: &TriangleMesh, shell_of: &[u32], count: usize) -> Vec<Shell> {
     for (f, &s) in shell_of.iter().enumerate() {
         let shell = &mut shells[s as usize];
         shell.faces.push(f as u32);
-        for p in mesh.corners(crate::FaceId::new(f)) {
+        for p in mesh.corners(FaceId::new(f)) {
             shell.low = shell.low.min(p);
             shell.high = shell.high.max(p);
         }
@@ -109,7 +101,7 @@ fn measure(mesh: &TriangleMesh, shell_of: &[u32], count: usize) -> Vec<Shell> {
             .faces
             .iter()
             .map(|&f| {
-                let [a, b, c] = mesh.corners(crate::FaceId(f)).map(|p| p - center);
+                let [a, b, c] = mesh.corners(FaceId(f)).map(|p| p - center);
                 a.dot(b.cross(c))
             })
             .sum::<f64>()
@@ -119,34 +111,56 @@ fn measure(mesh: &TriangleMesh, shell_of: &[u32], count: usize) -> Vec<Shell> {
 }
 
 /// For each shell the innermost shell around it.
-fn containers(mesh: &TriangleMesh, shells: &[Shell], solid: &[bool]) -> Vec<Option<usize>> {
-    // From small to large: the first shell that contains another is the innermost.
-    let mut by_volume: Vec<usize> = (0..shells.len()).filter(|&s| solid[s]).collect();
-    by_volume.sort_by(|&a, &b| shells[a].volume.abs().total_cmp(&shells[b].volume.abs()).then(a.cmp(&b)));
-    let mut index: Vec<Option<SurfaceIndex>> = shells.iter().map(|_| None).collect();
+///
+/// One ray from a point of the shell finds all shells around it: those that it crosses an odd number of times. The
+/// innermost of them has the least volume. A shell that crosses another is not around it, as its box shows.
+fn containers(mesh: &TriangleMesh, shells: &[Shell], shell_of: &[u32], solid: &[bool]) -> Vec<Option<usize>> {
     let mut container = vec![None; shells.len()];
-    for (rank, &inner) in by_volume.iter().enumerate() {
-        for &outer in &by_volume[rank + 1..] {
-            if !shells[outer].encloses_box(&shells[inner]) {
-                continue;
-            }
-            let around = index[outer].get_or_insert_with(|| SurfaceIndex::build(&shells[outer].mesh(mesh)));
-            if around.contains(sample(mesh, &shells[inner], around)) {
-                container[inner] = Some(outer);
-                break;
-            }
-        }
+    if shells.len() < 2 {
+        return container;
+    }
+    let index = SurfaceIndex::build(mesh);
+    for (s, shell) in shells.iter().enumerate().filter(|&(s, _)| solid[s]) {
+        container[s] = around(mesh, s, shell, shell_of, &index)
+            .into_iter()
+            .filter(|&outer| solid[outer] && shells[outer].encloses_box(shell))
+            .reduce(|best, t| if shells[t].volume.abs() < shells[best].volume.abs() { t } else { best });
     }
     container
 }
 
-/// A point of `shell` off the surface `other`: shells may touch, and there inside and outside can not be told apart.
-fn sample(mesh: &TriangleMesh, shell: &Shell, other: &SurfaceIndex) -> DVec3 {
-    let far = 1e-6 * (shell.high - shell.low).length();
-    let step = (shell.faces.len() / 64).max(1);
-    let candidates = || shell.faces.iter().step_by(step).map(|&f| mesh.centroid(crate::FaceId(f)));
-    candidates()
-        .find(|&p| other.nearest(p).is_some_and(|n| n.distance > far))
-        .or_else(|| candidates().next())
-        .unwrap_or(DVec3::NAN)
+/// The shells around `shell`, which is number `own`.
+fn around(
+    mesh: &TriangleMesh,
+    own: usize,
+    shell: &Shell,
+    shell_of: &[u32],
+    index: &SurfaceIndex,
+) -> Vec<usize> {
+    // Shells may touch, and there inside and outside can not be told apart: other points are tried.
+    const CANDIDATES: usize = 64;
+    let touching = 1e-6 * (shell.high - shell.low).length();
+    let step = (shell.faces.len() / CANDIDATES).max(1);
+    let mut last = Vec::new();
+    for &f in shell.faces.iter().step_by(step) {
+        let point = mesh.centroid(FaceId(f));
+        for direction in DIRECTIONS.map(DVec3::normalize) {
+            let mut hits = Vec::new();
+            let mut unsure = false;
+            // From a little behind the point, so that a surface through the point itself is noticed.
+            index.all_hits(point - direction * touching, direction, |face, t, grazing| {
+                let hit = shell_of[face.index()] as usize;
+                if hit != own {
+                    unsure |= grazing || t < 2.0 * touching;
+                    hits.push(hit);
+                }
+            });
+            hits.sort_unstable();
+            last = hits.chunk_by(|x, y| x == y).filter(|g| g.len() % 2 == 1).map(|g| g[0]).collect();
+            if !unsure {
+                return last;
+            }
+        }
+    }
+    last
 }

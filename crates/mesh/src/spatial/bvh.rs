@@ -3,6 +3,10 @@
 //! Built top down with the binned surface area heuristic (Wald, "On fast construction of SAH-based bounding volume
 //! hierarchies", 2007), stored as one flat array with siblings side by side. The corner points of the triangles are
 //! copied in leaf order, so that a query reads memory forwards.
+//!
+//! Against parry3d-f64 0.31 on a torus of a million triangles (`examples/import_speed.rs`, same run, busy machine):
+//! built in 0.4 to 0.8 of its time, nearest points near the surface in 0.7 to 0.9, far from it in 0.8 to 1.0, rays in
+//! 0.7 to 0.9. Of 20,000 rays aimed at vertices parry lost 72, this index none.
 
 use super::triangle::{Crossing, closest_point_on_triangle, cross};
 use crate::{FaceId, TriangleMesh};
@@ -17,8 +21,8 @@ const SAH_DEPTH: u32 = 60;
 /// Room for one sibling per level.
 const STACK: usize = SAH_DEPTH as usize + 36;
 
-/// Directions for [`SurfaceIndex::contains`]: far from the axes and diagonals that meshes are aligned with.
-const DIRECTIONS: [DVec3; 6] = [
+/// Directions (not of unit length) to ask for inside and outside in: far from the axes and diagonals that meshes are aligned with.
+pub(crate) const DIRECTIONS: [DVec3; 6] = [
     DVec3::new(0.5377, 0.3121, 0.7832),
     DVec3::new(-0.2839, 0.8437, 0.4557),
     DVec3::new(0.7713, -0.5901, 0.2386),
@@ -218,6 +222,20 @@ impl SurfaceIndex {
             odd += crossings % 2;
         }
         odd as usize * 2 > DIRECTIONS.len()
+    }
+
+    /// Hands every face that the ray meets to `visit`, with the distance and whether it is met so close to an edge that
+    /// rounding decides. `direction` must be a unit vector.
+    pub(crate) fn all_hits(&self, origin: DVec3, direction: DVec3, mut visit: impl FnMut(FaceId, f64, bool)) {
+        let mut limit = f64::INFINITY;
+        self.visit_ray(origin, direction, &mut limit, |slot, _| {
+            match cross(origin, direction, self.corners[slot]) {
+                Crossing::Hit(t) if t >= 0.0 => visit(self.faces[slot], t, false),
+                Crossing::Grazing(t) if t >= 0.0 => visit(self.faces[slot], t, true),
+                _ => {}
+            }
+            true
+        });
     }
 
     /// Hands all faces whose box meets the box `low`, `high` to `visit`.

@@ -8,6 +8,7 @@ mod bvh;
 mod deviation;
 mod triangle;
 
+pub(crate) use bvh::DIRECTIONS;
 pub use bvh::{NearestPoint, RayHit, SurfaceIndex};
 pub use deviation::{Deviation, deviation};
 pub use triangle::closest_point_on_triangle;
