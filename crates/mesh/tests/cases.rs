@@ -1,8 +1,8 @@
 //! The optimized parts of `fixtures/`: counts, genus and volume are those that the programs that made them wrote down.
 
 use std::path::{Path, PathBuf};
-use topipe_mesh::import::{ImportOptions, Source, read_source};
-use topipe_mesh::{Connectivity, Design, Part};
+use topipe_mesh::import::{ImportOptions, Source, read, read_source};
+use topipe_mesh::{Connectivity, Design, Part, Provenance};
 use topipe_progress::Progress;
 
 fn fixture(path: &str) -> PathBuf {
@@ -50,4 +50,50 @@ fn counts_genus_volume_and_labels_are_as_recorded() {
         assert_eq!(part.import.format, "STL (binary)");
         assert_eq!(part.import.repairs, [], "{name}");
     }
+}
+
+#[test]
+fn the_space_frame_is_one_ring_of_beams() {
+    let part =
+        read("space-frame.off", &bytes("space-frame/space-frame.off"), &ImportOptions::default()).unwrap();
+    let connectivity = Connectivity::build(&part.mesh).unwrap();
+    assert_eq!((part.mesh.vertex_count(), part.mesh.face_count()), (10180, 20360));
+    assert_eq!(connectivity.genus(&part.mesh), Some(1));
+    assert_eq!(part.import.repairs, []);
+}
+
+/// Two files of one mesh: the vertices of an STL are numbered as its faces first name them, and traced back to them.
+#[test]
+fn vertices_of_an_stl_are_traced_to_their_first_corner() {
+    let stl = bytes("monster-lite/monster-lite.stl");
+    let part = read("monster-lite.stl", &stl, &ImportOptions::default()).unwrap();
+    let coordinate = |corner: usize, axis: usize| {
+        let at = 84 + 50 * (corner / 3) + 12 + 12 * (corner % 3) + 4 * axis;
+        f64::from(f32::from_le_bytes(stl[at..at + 4].try_into().unwrap()))
+    };
+    let mut last = None;
+    for (v, from) in part.provenance.iter().enumerate() {
+        let &Provenance::Vertex(corner) = from else { panic!("no edge was divided") };
+        assert_eq!(part.mesh.positions[v].to_array(), [0, 1, 2].map(|axis| coordinate(corner.index(), axis)));
+        assert!(last < Some(corner));
+        last = Some(corner);
+    }
+}
+
+struct Stop;
+
+impl topipe_progress::Listener for Stop {
+    fn step(&self, _: u64, _: u64, _: &str) {}
+    fn remark(&self, _: &str) {}
+    fn interrupted(&self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn an_interrupted_import_says_so() {
+    let stl = bytes("monster-lite/monster-lite.stl");
+    let progress = Progress::new(std::sync::Arc::new(Stop));
+    let error = read_source(&Source::new("a.stl", &stl), &ImportOptions::default(), &progress).unwrap_err();
+    assert_eq!(error, topipe_mesh::import::ImportError::Interrupted(topipe_progress::Interrupted));
 }
