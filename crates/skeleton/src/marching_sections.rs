@@ -82,6 +82,10 @@ pub(crate) fn skeletonize(
     non_design::join(&mut skeleton, part, connectivity, sets, &inside, &interface_points);
     skeleton.finish();
     let degrees = skeleton.degrees();
+    let ends = skeleton.kinds.iter().filter(|k| **k == PointKind::End).count();
+    if ends > 0 && !sets.interfaces.is_empty() {
+        skeleton.remarks.push(format!("{ends} branches end freely, at no interface"));
+    }
     let bare = interface_points.iter().filter(|&&p| degrees[p as usize] < 2).count();
     if bare > 0 {
         skeleton.remarks.push(format!("{bare} interfaces have no branch"));
@@ -158,7 +162,15 @@ fn trace(
             }
         }
     }
-    Ok((graph, axes.into_iter().map(Option::unwrap_or_default).collect()))
+    let axes: Vec<_> = axes.into_iter().map(Option::unwrap_or_default).collect();
+    let shapeless =
+        (graph.branches.iter().zip(&axes)).filter(|(b, a)| b.is_some() && a.sections.len() < 2).count();
+    if shapeless > 0 {
+        remarks.push(format!(
+            "{shapeless} branches have no clean section: not beams, or too short for their width"
+        ));
+    }
+    Ok((graph, axes))
 }
 
 /// Changes when a branch is removed or joined with another; not when its ends are renamed.

@@ -168,6 +168,25 @@ fn parts_that_are_no_beams_have_a_skeleton_with_a_cycle_per_handle() {
 }
 
 #[test]
+fn cycles_and_the_holes_of_non_design_parts_make_the_genus() {
+    for case in ["bracket", "support", "beam-two-holes", "bridge"] {
+        let part = fixture(case);
+        let skeleton = run(&part);
+        let holes: i64 = (skeleton.remarks.iter())
+            .filter_map(|r| r.split(" holes of its own").next()?.rsplit("has ").next()?.parse::<i64>().ok())
+            .sum();
+        let genus = Connectivity::build(&part.mesh).unwrap().genus(&part.mesh).unwrap();
+        assert_eq!(skeleton.measures().cycles as i64 + holes, genus, "{case}: {:?}", skeleton.remarks);
+        for &[a, b] in &skeleton.edges {
+            assert!(
+                skeleton.points[a as usize] != skeleton.points[b as usize],
+                "{case}: {a} and {b} coincide"
+            );
+        }
+    }
+}
+
+#[test]
 fn threads_do_not_change_a_bit() {
     let part = fixture("cantilever");
     let with = |threads| {

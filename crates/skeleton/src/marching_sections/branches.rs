@@ -29,6 +29,8 @@ pub(super) struct Sample {
 pub(super) struct Branch {
     pub(super) ends: [usize; 2],
     pub(super) samples: Vec<Sample>,
+    /// A point of the surface at one of its ends.
+    pub(super) mouth: DVec3,
     /// The vertices of the surface around it, to find its sections by.
     pub(super) vertices: Vec<VertexId>,
 }
@@ -65,7 +67,13 @@ impl BranchGraph {
                         samples.push(sample);
                     }
                 }
-                Some(Branch { ends: arc.ends.map(|n| n as usize), samples, vertices: arc.vertices.clone() })
+                let mouth = piece.mesh.position(reeb.nodes[arc.ends[0] as usize]);
+                Some(Branch {
+                    ends: arc.ends.map(|n| n as usize),
+                    samples,
+                    mouth,
+                    vertices: arc.vertices.clone(),
+                })
             })
             .collect();
         let places = reeb.nodes.iter().map(|&v| piece.mesh.position(v)).collect();

@@ -51,7 +51,7 @@ pub(super) fn emit(
             }
             NodeKind::Tip(tip) => {
                 let (b, end) = incident[0];
-                let at = free_end(&axes[b], end == 0, tip, inside);
+                let at = free_end(graph.branches[b].as_ref(), &axes[b], end == 0, tip, inside);
                 Place { at, point: Some(skeleton.add_point(at, PointKind::End, Section::None)) }
             }
         });
@@ -112,14 +112,19 @@ fn meeting_point(graph: &BranchGraph, axes: &[Axis], incident: &[(usize, usize)]
 }
 
 /// A free end: straight on from the last clean section, to just below the surface.
-fn free_end(axis: &Axis, at_start: bool, tip: DVec3, inside: &Inside) -> DVec3 {
-    let Some((end, direction)) = axis.ray(at_start) else {
-        return inside.nearest_middle(tip).unwrap_or(tip);
-    };
-    let step = 0.05 * axis.radius();
-    let most = (end.distance(tip) / step).clamp(1.0, 1000.0) as usize;
-    let reached = (1..=most).take_while(|&k| inside.contains(end + k as f64 * step * direction)).count();
-    end + (reached as f64 - 0.5).max(0.0) * step * direction
+fn free_end(branch: Option<&Branch>, axis: &Axis, at_start: bool, tip: DVec3, inside: &Inside) -> DVec3 {
+    let mut choices = Vec::new();
+    if let Some((end, direction)) = axis.ray(at_start) {
+        let step = 0.05 * axis.radius();
+        let most = (end.distance(tip) / step).clamp(1.0, 1000.0) as usize;
+        let reached = (1..=most).take_while(|&k| inside.contains(end + k as f64 * step * direction)).count();
+        choices.push(end + (reached as f64 - 0.5).max(0.0) * step * direction);
+    }
+    let samples = branch.map_or(&[][..], |b| &b.samples);
+    choices.extend(if at_start { samples.first() } else { samples.last() }.map(|s| tip.midpoint(s.point)));
+    choices.extend(inside.nearest_middle(tip));
+    choices.extend(samples.iter().map(|s| s.point));
+    choices.iter().copied().find(|&p| inside.contains(p)).or(choices.first().copied()).unwrap_or(tip)
 }
 
 /// The points of a branch between its ends: sparse, and centred with the tangents they have in the skeleton.
@@ -234,6 +239,7 @@ fn without_axis(branch: &Branch, ends: [Place; 2], least: usize, inside: &Inside
     let short = line.len() < least;
     if short {
         line.insert(0, ends[0].at);
+        line.push(branch.mouth.midpoint(ends[0].at));
         line.push(ends[1].at);
     }
     let length: f64 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
