@@ -13,33 +13,30 @@ use glam::DVec3;
 use rayon::prelude::*;
 use robust::{Coord3D, orient3d};
 
-/// Faces examined together; fixed, so that the answer does not depend on the number of threads.
-const CHUNK: usize = 512;
+/// Leaves of the index examined together by one thread.
+const CHUNK: usize = 128;
 
 /// Refuses a surface that passes through itself.
 pub(super) fn refuse_crossings(file: &str, draft: &Draft) -> Result<(), ImportError> {
     let mesh = &draft.mesh;
     let index = SurfaceIndex::build(mesh);
-    let faces: Vec<FaceId> = mesh.faces().collect();
-    let found: Vec<(FaceId, FaceId, DVec3)> = faces
+    let mut found: Vec<(FaceId, FaceId, DVec3)> = index
+        .leaves()
         .par_chunks(CHUNK)
         .flat_map_iter(|chunk| {
             let mut found = Vec::new();
-            for &f in chunk {
-                let [a, b, c] = mesh.corners(f);
-                let first = found.len();
-                index.faces_near_box(a.min(b).min(c), a.max(b).max(c), |g| {
-                    if f < g
-                        && let Some(point) = crossing(mesh, f, g)
-                    {
+            for &leaf in chunk {
+                index.pairs_of_leaf(leaf, |f, g| {
+                    let (f, g) = (f.min(g), f.max(g));
+                    if let Some(point) = crossing(mesh, f, g) {
                         found.push((f, g, point));
                     }
                 });
-                found[first..].sort_unstable_by_key(|x| x.1);
             }
             found
         })
         .collect();
+    found.sort_unstable_by_key(|&(f, g, _)| (f, g));
     let Some(&(f, g, point)) = found.first() else { return Ok(()) };
     let (x, y) = (draft.face_of[f.index()], draft.face_of[g.index()]);
     Err(ImportError::SelfIntersection {

@@ -238,31 +238,37 @@ impl SurfaceIndex {
         });
     }
 
-    /// Hands all faces whose box meets the box `low`, `high` to `visit`.
-    pub(crate) fn faces_near_box(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(FaceId)) {
-        let meets = |n: &Node| n.low.cmple(high).all() && n.high.cmpge(low).all();
-        if !self.nodes.first().is_some_and(meets) {
-            return;
-        }
+    /// The leaves, for [`Self::pairs_of_leaf`].
+    pub(crate) fn leaves(&self) -> Vec<u32> {
+        (0..self.nodes.len() as u32).filter(|&n| self.nodes[n as usize].count > 0).collect()
+    }
+
+    /// Hands pairs of faces with overlapping boxes to `visit`: over all leaves each pair once. The faces of a leaf
+    /// share one walk through the tree.
+    pub(crate) fn pairs_of_leaf(&self, leaf: u32, mut visit: impl FnMut(FaceId, FaceId)) {
+        let leaf = self.nodes[leaf as usize];
+        let slots = |n: &Node| n.first as usize..(n.first + n.count) as usize;
+        let own: Vec<_> = slots(&leaf).map(|slot| (slot, extent(self.corners[slot]))).collect();
         let mut stack = [0u32; STACK];
         let mut depth = 1;
         while depth > 0 {
             depth -= 1;
             let node = &self.nodes[stack[depth] as usize];
-            if node.count > 0 {
-                for slot in node.first as usize..(node.first + node.count) as usize {
-                    let [a, b, c] = self.corners[slot];
-                    let beside = a.min(b).min(c).cmpgt(high).any() || a.max(b).max(c).cmplt(low).any();
-                    if !beside {
-                        visit(self.faces[slot]);
-                    }
-                }
+            if node.low.cmpgt(leaf.high).any() || node.high.cmplt(leaf.low).any() {
                 continue;
             }
-            for child in [node.first + 1, node.first] {
-                if meets(&self.nodes[child as usize]) {
-                    stack[depth] = child;
-                    depth += 1;
+            if node.count == 0 {
+                stack[depth] = node.first + 1;
+                stack[depth + 1] = node.first;
+                depth += 2;
+                continue;
+            }
+            for other in slots(node).filter(|&other| other > leaf.first as usize) {
+                let (low, high) = extent(self.corners[other]);
+                for &(slot, (own_low, own_high)) in own.iter().filter(|o| o.0 < other) {
+                    if own_low.cmple(high).all() && own_high.cmpge(low).all() {
+                        visit(self.faces[slot], self.faces[other]);
+                    }
                 }
             }
         }
@@ -407,6 +413,10 @@ impl Builder {
         self.order[middle..first + count].copy_from_slice(&upper);
         Some(middle)
     }
+}
+
+fn extent([a, b, c]: [DVec3; 3]) -> (DVec3, DVec3) {
+    (a.min(b).min(c), a.max(b).max(c))
 }
 
 fn half_area(low: DVec3, high: DVec3) -> f64 {
