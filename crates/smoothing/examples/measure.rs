@@ -157,7 +157,7 @@ fn case(path: &str, parameters: &Parameters, write: Option<&str>) {
     println!("  free surface before: {}", free_surface(&part.mesh, &smoothed));
     println!("  free surface after:  {}", free_surface(&smoothed.mesh, &smoothed));
     if let Some(directory) = write {
-        let name = path.rsplit('/').next().unwrap_or(path);
+        let name = path.rsplit('/').next().unwrap_or(path).replace(".stl", ".off");
         let mut text = format!("OFF\n{} {} 0\n", smoothed.mesh.vertex_count(), smoothed.mesh.face_count());
         for p in &smoothed.mesh.positions {
             let _ = writeln!(text, "{} {} {}", p.x, p.y, p.z);
@@ -165,8 +165,7 @@ fn case(path: &str, parameters: &Parameters, write: Option<&str>) {
         for t in &smoothed.mesh.triangles {
             let _ = writeln!(text, "3 {} {} {}", t[0].0, t[1].0, t[2].0);
         }
-        std::fs::write(format!("{directory}/{}", name.replace(".stl", ".off")), text)
-            .expect("a writable directory");
+        std::fs::write(format!("{directory}/{name}"), text).expect("a writable directory");
         let regions: String = smoothed.region_of_face.iter().map(|r| format!("{}\n", r.0 as i32)).collect();
         std::fs::write(format!("{directory}/{name}.regions"), regions).expect("a writable directory");
         let edges: String = smoothed

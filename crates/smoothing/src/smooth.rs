@@ -6,7 +6,7 @@ use crate::methods;
 use crate::outline::OutlineGuard;
 use crate::volume::VolumeKeeper;
 use crate::{Method, Parameters, SmoothingError};
-use topipe_mesh::{Connectivity, Design, FeatureKind, Part, RegionId, SmoothingRecord};
+use topipe_mesh::{Connectivity, DVec3, Design, FeatureKind, Part, RegionId, SmoothingRecord};
 use topipe_progress::Progress;
 
 /// A step longer than this many mean edge lengths (root mean square) is no smoothing any more.
@@ -45,7 +45,8 @@ pub fn smooth(part: &Part, parameters: &Parameters, progress: &Progress) -> Resu
         record.converged = true;
     } else {
         let domain = domain(&connectivity, &features, &frozen, mesh.vertex_count());
-        iterate(part, &connectivity, &features, &domain, parameters, progress, &mut result, &mut record)?;
+        result.mesh.positions =
+            iterate(part, &connectivity, &features, &domain, parameters, progress, &mut record)?;
     }
     let solid: Vec<bool> = mesh.triangles.iter().map(|t| t.iter().all(|v| frozen[v.index()])).collect();
     features.measure(&result.mesh);
@@ -131,6 +132,7 @@ fn domain(connectivity: &Connectivity, features: &Features, frozen: &[bool], ver
     Domain { start, neighbors, slides }
 }
 
+/// Iterates until the step is small, and returns the new positions.
 fn iterate(
     part: &Part,
     connectivity: &Connectivity,
@@ -138,9 +140,8 @@ fn iterate(
     domain: &Domain,
     parameters: &Parameters,
     progress: &Progress,
-    result: &mut Part,
     record: &mut SmoothingRecord,
-) -> Result<(), SmoothingError> {
+) -> Result<Vec<DVec3>, SmoothingError> {
     let mesh = &part.mesh;
     let original = &mesh.positions;
     let free = domain.free_count();
@@ -201,6 +202,5 @@ fn iterate(
         }
     }
     record.total_change = change(original, &current).distances;
-    result.mesh.positions = current;
-    Ok(())
+    Ok(current)
 }
