@@ -404,6 +404,25 @@ fn inspect_tells_what_is_in_a_mesh_and_in_a_result() {
     assert_eq!(shop.topipe(&["inspect", "smoth", "--pipeline", "box.toml"]).code, 2);
 }
 
+#[test]
+fn results_and_meshes_can_be_drawn() {
+    let shop = Workshop::new();
+    shop.edit("\"smooth.ply\" = \"smooth\"", "\"smooth.png\" = \"smooth\"");
+    assert_eq!(shop.topipe(&["run", "box.toml"]).code, 0);
+    let small = ["--size", "60x40"];
+    let drawn = shop.topipe(&[&["render", "box.off", "-o", "box.png"][..], &small].concat());
+    assert_eq!(drawn.code, 0, "{}", drawn.stderr);
+    let stage = ["render", "smooth", "--pipeline", "box.toml", "--view", "-30:20", "-o", "stage.png"];
+    assert_eq!(shop.topipe(&[&stage[..], &small].concat()).code, 0);
+    for (file, width) in [("topipe-out/box/smooth.png", 1200), ("box.png", 60), ("stage.png", 60)] {
+        let png = std::fs::read(shop.path(file)).unwrap();
+        assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
+        assert_eq!(png[16..20], u32::to_be_bytes(width));
+    }
+    assert_eq!(shop.topipe(&["render", "box.off", "-o", "x.png", "--view", "inside"]).code, 2);
+    assert_eq!(shop.topipe(&["render", "box.off", "-o", "x.png", "--size", "0x0"]).code, 2);
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_ends_with_130_and_the_next_one_finishes() {

@@ -8,8 +8,9 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Stage or writer, its crate, and its adapter here.
-const PARTS: [(&str, &str, &str); 7] = [
+/// Stage, its crate, and the file of its adapter in `stages` and of its writers in `export`. Pictures are no stage, they
+/// have a writer only.
+const PARTS: [(&str, &str, &str); 8] = [
     ("IMPORT", "mesh", "import.rs"),
     ("SMOOTHING", "smoothing", "smoothing.rs"),
     ("TILING", "tiling", "tiling.rs"),
@@ -17,6 +18,7 @@ const PARTS: [(&str, &str, &str); 7] = [
     ("SPLINE_FIT", "spline-fit", "spline_fit.rs"),
     ("SKELETON", "skeleton", "skeleton.rs"),
     ("VALIDATION", "validation", "validation.rs"),
+    ("PICTURE", "render", "picture.rs"),
 ];
 
 fn main() {
@@ -24,6 +26,7 @@ fn main() {
     let crates = here.join("..");
     println!("cargo::rerun-if-changed=src/stages");
     println!("cargo::rerun-if-changed=src/export");
+    println!("cargo::rerun-if-changed=src/picture.rs");
     for (part, name, adapter) in PARTS {
         let mut hasher = blake3::Hasher::new();
         for name in closure(&crates, name) {
@@ -35,15 +38,15 @@ fn main() {
                 hash_source(&mut hasher, &format!("{name}/{inside}"), &file);
             }
         }
-        hash_source(&mut hasher, adapter, &here.join("src/stages").join(adapter));
-        for file in sources(&here.join("src/export")) {
-            let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-            // The writers of an artifact belong to the crate that knows it.
-            if name == adapter || (part == "IMPORT" && name == "mesh.rs") {
-                hash_source(&mut hasher, &name, &file);
-            }
+        // A better writer must write its exports again, but is no reason to compute again what it writes.
+        let mut writer = hasher.clone();
+        hash_source(&mut writer, adapter, &here.join("src/export").join(adapter));
+        if part == "PICTURE" {
+            hash_source(&mut writer, adapter, &here.join("src").join(adapter));
         }
+        hash_source(&mut hasher, adapter, &here.join("src/stages").join(adapter));
         println!("cargo::rustc-env=TOPIPE_CODE_{part}={}", &hasher.finalize().to_hex()[..16]);
+        println!("cargo::rustc-env=TOPIPE_WRITER_{part}={}", &writer.finalize().to_hex()[..16]);
     }
 }
 

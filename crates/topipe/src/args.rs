@@ -64,6 +64,8 @@ pub enum Command {
     Schema,
     /// Say what is in a mesh file, an artifact file, or the result of a stage.
     Inspect(InspectArguments),
+    /// Draw a mesh file, an artifact file, or the result of a stage as PNG.
+    Render(RenderArguments),
     /// Look at the cache.
     Cache(CacheArguments),
     /// Write a commented pipeline for a mesh.
@@ -202,6 +204,31 @@ pub struct GraphArguments {
 /// `topipe inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArguments {
+    /// What to look at.
+    #[command(flatten)]
+    pub target: TargetArguments,
+}
+
+/// `topipe render`.
+#[derive(Debug, Args)]
+pub struct RenderArguments {
+    /// What to draw.
+    #[command(flatten)]
+    pub target: TargetArguments,
+    /// The picture.
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// From where: iso, front, back, left, right, top, bottom, or AZIMUTH:ELEVATION in degrees.
+    #[arg(long, default_value = "iso", allow_hyphen_values = true)]
+    pub view: String,
+    /// Pixels.
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1200x900")]
+    pub size: String,
+}
+
+/// Something that can be looked at.
+#[derive(Debug, Args)]
+pub struct TargetArguments {
     /// A mesh file, an artifact file, or with --pipeline the name of a stage.
     pub target: String,
     /// The pipeline of the stage.

@@ -9,6 +9,7 @@ mod commands;
 mod display;
 mod export;
 mod failure;
+mod picture;
 pub mod stages;
 
 use args::{Arguments, Command};
@@ -39,6 +40,7 @@ fn run(arguments: &Arguments) -> Result<topipe_engine::ExitCode, failure::Failur
         Command::Stages { kind } => commands::kinds::run(kind.as_deref()),
         Command::Schema => commands::schema::run(),
         Command::Inspect(inspect) => commands::inspect::run(inspect),
+        Command::Render(render) => commands::render::run(render),
         Command::Cache(cache) => commands::cache::run(cache),
         Command::New(new) => commands::new::run(new),
         Command::Completions { shell } => commands::completions::run(*shell),

@@ -4,57 +4,19 @@ use crate::args::InspectArguments;
 use crate::artifacts::{Mesh, QuadLayout, Report, Skeleton, SplineSurface, Tiling};
 use crate::display;
 use crate::failure::Failure;
-use crate::stages::registry;
 use std::fmt::Write;
 use std::path::Path;
-use topipe_engine::cache::Bucket;
-use topipe_engine::{ArtifactKind, Cache, Choice, Diagnostic, ExitCode, Pipeline, Source, codec, plan};
+use topipe_engine::{ArtifactKind, ExitCode, codec};
 use topipe_mesh::{Connectivity, Design, Part};
 
 pub(crate) fn run(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
-    let path = match &arguments.pipeline {
-        Some(pipeline) => stage_file(arguments, pipeline)?,
-        None => arguments.target.clone().into(),
-    };
-    let bytes = std::fs::read(&path).map_err(|error| Failure::io("read", &path, &error))?;
+    let (path, bytes) = super::target::read(&arguments.target)?;
     let text = match codec::open(&bytes) {
         Ok((header, _)) => artifact(&header, &bytes)?,
         Err(codec::DecodeError::NotAnArtifact) => mesh_file(&path, &bytes)?,
         Err(error) => return Err(Failure::new(ExitCode::Storage, format!("{}: {error}", path.display()))),
     };
     super::print(&text)
-}
-
-/// The artifact file of a stage.
-fn stage_file(arguments: &InspectArguments, path: &Path) -> Result<std::path::PathBuf, Failure> {
-    let pipeline = Pipeline::load(path, &[], &registry())?;
-    let stage = &arguments.target;
-    if pipeline.index_of(stage).is_none() {
-        let source = Source { name: "command line".into(), text: format!("inspect {stage}") };
-        let names = pipeline.stages.iter().map(|node| node.name.as_str());
-        return Err(Diagnostic::new(
-            &source.into(),
-            8..8 + stage.len(),
-            format!("there is no stage `{stage}`"),
-        )
-        .suggest(stage, names)
-        .into());
-    }
-    let beside = || path.parent().unwrap_or(Path::new("")).join(".topipe");
-    let cache = Cache::new(arguments.cache.clone().unwrap_or_else(beside));
-    let choice = Choice { until: vec![stage.clone()], ..Choice::default() };
-    let planned = plan(&pipeline, &cache, &choice)?.stages.pop();
-    let record = match planned.and_then(|planned| planned.key) {
-        Some(key) => cache.key_record(key, &mut Vec::new())?,
-        None => None,
-    };
-    match record {
-        Some(record) => Ok(cache.path(Bucket::Artifacts, record.artifact)),
-        None => Err(Failure::new(
-            ExitCode::Storage,
-            format!("stage `{stage}` has no result in the cache; run it with `topipe run --until {stage}`"),
-        )),
-    }
 }
 
 fn artifact(header: &codec::Header, bytes: &[u8]) -> Result<String, Failure> {

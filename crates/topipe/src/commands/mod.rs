@@ -7,8 +7,10 @@ pub(crate) mod inspect;
 pub(crate) mod kinds;
 pub(crate) mod new;
 pub(crate) mod plan;
+pub(crate) mod render;
 pub(crate) mod run;
 pub(crate) mod schema;
+mod target;
 
 use crate::failure::Failure;
 use std::io::{ErrorKind, Write};

@@ -1,6 +1,8 @@
-//! The writers: one file per kind of artifact, one line each in [`exporters`].
+//! The writers: one file per kind of artifact, named like the stage that makes it, and one line each in
+//! [`exporters`].
 
-mod mesh;
+mod import;
+mod picture;
 mod quad_matching;
 mod skeleton;
 mod spline_fit;
@@ -10,10 +12,11 @@ use topipe_engine::Exporter;
 
 /// All writers.
 pub(crate) fn exporters() -> impl Iterator<Item = Exporter> {
-    mesh::exporters()
+    import::exporters()
         .into_iter()
         .chain(spline_fit::exporters())
         .chain(quad_matching::exporters())
         .chain(skeleton::exporters())
         .chain(validation::exporters())
+        .chain(picture::exporters())
 }

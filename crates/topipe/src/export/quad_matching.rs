@@ -5,7 +5,7 @@ use std::io::Write;
 use topipe_engine::{ExportError, Exporter};
 
 pub(super) fn exporters() -> Vec<Exporter> {
-    vec![Exporter::new::<QuadLayout>("obj", env!("TOPIPE_CODE_QUAD_MATCHING"), |layout, _, file| {
+    vec![Exporter::new::<QuadLayout>("obj", env!("TOPIPE_WRITER_QUAD_MATCHING"), |layout, _, file| {
         obj(layout, file)
     })]
 }

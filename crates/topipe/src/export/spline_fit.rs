@@ -10,7 +10,7 @@ use topipe_spline_fit::step;
 const CHORD: f64 = 5e-4;
 
 pub(super) fn exporters() -> Vec<Exporter> {
-    let version = env!("TOPIPE_CODE_SPLINE_FIT");
+    let version = env!("TOPIPE_WRITER_SPLINE_FIT");
     vec![
         Exporter::new::<SplineSurface>("step", version, |surface, name, mut file| {
             Ok(step::write(surface, name, &mut file)?)

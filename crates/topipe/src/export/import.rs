@@ -5,7 +5,7 @@ use topipe_engine::Exporter;
 use topipe_mesh::write;
 
 pub(super) fn exporters() -> Vec<Exporter> {
-    let version = env!("TOPIPE_CODE_IMPORT");
+    let version = env!("TOPIPE_WRITER_IMPORT");
     vec![
         Exporter::new::<Mesh>("stl", version, |part, _, mut file| Ok(write::stl(&part.mesh, &mut file)?)),
         Exporter::new::<Mesh>("off", version, |part, _, mut file| Ok(write::off(&part.mesh, &mut file)?)),

@@ -1,0 +1,96 @@
+//! How each kind of artifact is drawn.
+
+use topipe_mesh::{DVec3, Part, TriangleMesh};
+use topipe_quad_matching::QuadLayout;
+use topipe_render::{
+    Camera, Color, Coloring, Image, LineLayer, LineWidth, MeshLayer, Options, RenderError, Scene, palette,
+    render,
+};
+use topipe_skeleton::Skeleton;
+use topipe_spline_fit::SplineSurface;
+use topipe_tiling::Tiling;
+
+/// From where, how large.
+pub(crate) struct View {
+    pub(crate) camera: Camera,
+    pub(crate) options: Options,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self { camera: Camera::ISO, options: Options::default() }
+    }
+}
+
+/// Largest distance of a drawn surface from the true one over its diagonal: less than a pixel.
+const CHORD: f64 = 2e-4;
+/// Radius of a drawn skeleton over its diagonal.
+const TUBE: f64 = 0.004;
+
+/// A mesh, lit.
+pub(crate) fn mesh(part: &Part, view: &View) -> Result<Image, RenderError> {
+    render(Scene::default().add_mesh(MeshLayer::new(&part.mesh)), &view.camera, &view.options)
+}
+
+/// A mesh with a color for each tile.
+pub(crate) fn tiling(tiling: &Tiling, view: &View) -> Result<Image, RenderError> {
+    let tiles: Vec<u32> = tiling.tile_of_face.iter().map(|tile| tile.0).collect();
+    render(Scene::default().add_mesh(by_id(&tiling.part.mesh, &tiles)), &view.camera, &view.options)
+}
+
+/// A mesh with a color for each quad, and the sides of the quads.
+pub(crate) fn layout(layout: &QuadLayout, view: &View) -> Result<Image, RenderError> {
+    let mesh = &layout.part.mesh;
+    let sides =
+        layout.edges.iter().map(|edge| edge.path.iter().map(|&v| mesh.position(v)).collect()).collect();
+    let mut scene = Scene::default();
+    scene.add_mesh(by_id(mesh, &layout.quad_of_face)).add_lines(lines(sides));
+    render(&scene, &view.camera, &view.options)
+}
+
+/// A surface and the edges of its patches.
+pub(crate) fn surface(surface: &SplineSurface, view: &View) -> Result<Image, RenderError> {
+    let mesh = surface.tessellate(CHORD * extent(&surface.vertices));
+    let edges = surface.edges.iter();
+    let edges = edges.map(|edge| (0..=32).map(|k| edge.position(f64::from(k) / 32.0)).collect()).collect();
+    let mut scene = Scene::default();
+    scene.add_mesh(MeshLayer::new(&mesh)).add_lines(lines(edges));
+    render(&scene, &view.camera, &view.options)
+}
+
+/// A skeleton: edges as tubes, ends and junctions as balls.
+pub(crate) fn skeleton(skeleton: &Skeleton, view: &View) -> Result<Image, RenderError> {
+    let radius = TUBE * extent(&skeleton.points);
+    let at = |point: u32| skeleton.points[point as usize];
+    let degrees = skeleton.degrees();
+    let nodes = (0..skeleton.points.len()).filter(|&point| degrees[point] != 2);
+    let mut scene = Scene::default();
+    scene
+        .add_lines(LineLayer {
+            polylines: skeleton.edges.iter().map(|&[a, b]| vec![at(a), at(b)]).collect(),
+            coloring: Coloring::Uniform(Color([196, 44, 56])),
+            width: LineWidth::Tube(radius),
+        })
+        .add_lines(LineLayer {
+            polylines: nodes.map(|point| vec![skeleton.points[point]]).collect(),
+            coloring: Coloring::Uniform(Color([40, 70, 150])),
+            width: LineWidth::Tube(2.2 * radius),
+        });
+    render(&scene, &view.camera, &view.options)
+}
+
+fn by_id<'a>(mesh: &'a TriangleMesh, ids: &[u32]) -> MeshLayer<'a> {
+    let coloring = Coloring::PerElement(palette::categorical_faces(mesh, ids));
+    MeshLayer { coloring, ..MeshLayer::new(mesh) }
+}
+
+fn lines(polylines: Vec<Vec<DVec3>>) -> LineLayer {
+    LineLayer { polylines, coloring: Coloring::Uniform(Color::LINE), width: LineWidth::Pixels(1.5) }
+}
+
+/// The diagonal of the box around some points.
+fn extent(points: &[DVec3]) -> f64 {
+    let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    if points.is_empty() { 0.0 } else { (high - low).length() }
+}
