@@ -41,10 +41,10 @@ pub fn match_quads(
     }
     progress.check()?;
     let followed = edges.iter().filter(|e| e.feature.is_some()).count();
-    let lost = (0..edges.len())
-        .filter(|&i| edges[i].feature.is_some() && partner.contains(&Some(i)))
-        .count();
-    progress.remark(&format!("{followed} macro-edges follow features, {lost} of them were removed by the matching"));
+    let lost = (0..edges.len()).filter(|&i| edges[i].feature.is_some() && partner.contains(&Some(i))).count();
+    progress.remark(&format!(
+        "{followed} macro-edges follow features, {lost} of them were removed by the matching"
+    ));
 
     // Each matched diagonal makes one quad.
     let side = |from: u32, to: u32| -> Result<Side, QuadMatchingError> {

@@ -1,59 +1,102 @@
-//! The tessellation on the reference parts.
+//! The layout on the reference parts.
 
-use topipe_mesh::{Part, TriangleMesh};
+use topipe_mesh::Part;
+use topipe_mesh::import::{ImportOptions, read};
 use topipe_progress::Progress;
-use topipe_quad_matching::match_quads;
-use topipe_tiling::tile;
+use topipe_quad_matching::{Parameters, QuadLayout, QuadMatchingError, match_quads, verify};
+use topipe_tiling::{Tiling, tile};
 
-fn off(path: &str) -> Part {
-    let text = std::fs::read_to_string(path).unwrap();
-    let mut words = text.split_whitespace().skip(1).map(|w| w.parse::<f64>().unwrap());
-    let mut next = || words.next().unwrap();
-    let (n, m) = (next() as usize, next() as usize);
-    next();
-    let positions = (0..n).map(|_| [next(), next(), next()]).collect();
-    let triangles = (0..m)
-        .map(|_| {
-            next();
-            [next() as u32, next() as u32, next() as u32]
-        })
-        .collect();
-    Part::new(TriangleMesh::from_arrays(positions, triangles))
+fn fixture(name: &str) -> Part {
+    let ending = if name == "space-frame" { "off" } else { "stl" };
+    let path = format!("{}/../../fixtures/{name}/{name}.{ending}", env!("CARGO_MANIFEST_DIR"));
+    read(&path, &std::fs::read(&path).unwrap(), &ImportOptions::default()).unwrap()
+}
+
+fn tiling(name: &str) -> Tiling {
+    tile(&fixture(name), &Default::default(), &Progress::silent()).unwrap()
+}
+
+fn layout(tiling: &Tiling) -> QuadLayout {
+    match_quads(tiling, &Parameters::default(), &Progress::silent()).unwrap()
 }
 
 #[test]
-fn all() {
-    for name in [
-        "bracket",
-        "beam-two-holes",
-        "bridge",
-        "bell-crank",
-        "support",
-        "cantilever",
-        "cantilever-four",
-        "y-form",
-        "monster-lite",
-        "space-frame",
+fn layouts_of_all_reference_parts_hold_what_they_promise() {
+    for (name, genus) in [
+        ("bracket", 8),
+        ("beam-two-holes", 18),
+        ("bridge", 19),
+        ("bell-crank", 21),
+        ("support", 5),
+        ("cantilever", 4),
+        ("cantilever-four", 6),
+        ("y-form", 0),
+        ("monster-lite", 1),
+        ("space-frame", 1),
     ] {
-        let part = off(&format!("/work/shared/data/{name}/{name}.off"));
-        let tiling = tile(&part, &Default::default(), &Progress::silent()).unwrap();
-        let t = std::time::Instant::now();
-        let layout = match_quads(&tiling, &Default::default(), &Progress::silent());
-        let dt = t.elapsed();
-        match layout {
-            Ok(l) => {
-                let mut v = std::collections::BTreeMap::new();
-                for x in l.valences() {
-                    *v.entry(x).or_insert(0) += 1;
-                }
-                println!(
-                    "{name}: {} quads {} faces {dt:?} {v:?} {:?}",
-                    l.quads.len(),
-                    l.part.mesh.face_count(),
-                    &topipe_quad_matching::verify(&l)
-                )
-            }
-            Err(e) => println!("{name}: {e}"),
-        }
+        let tiling = tiling(name);
+        let layout = layout(&tiling);
+        assert_eq!(verify(&layout), Vec::<String>::new(), "{name}");
+        // Counts of the dual of a trivalent tiling.
+        let tiles = tiling.tile_count() as i64;
+        assert_eq!(i64::from(layout.macro_triangles), 2 * tiles - 4 + 4 * genus, "{name}");
+        let (v, e, f) = (layout.vertices.len() as i64, layout.edges.len() as i64, layout.quads.len() as i64);
+        assert_eq!((e, v - e + f), (2 * f, 2 - 2 * genus), "{name}");
+        assert!(layout.valences().iter().all(|&valence| valence >= 3), "{name}");
+        // Refinement moves no point.
+        let (before, after) = (&tiling.part.mesh, &layout.part.mesh);
+        assert!((after.volume() / before.volume() - 1.0).abs() < 1e-11, "{name}");
+        assert!((after.area() / before.area() - 1.0).abs() < 1e-11, "{name}");
+        assert_eq!(after.positions[..before.vertex_count()], before.positions[..]);
     }
+}
+
+#[test]
+fn the_number_of_threads_does_not_matter() {
+    let tiling = tiling("monster-lite");
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| layout(&tiling))
+    };
+    let one = with(1);
+    assert_eq!(one, with(2));
+    assert_eq!(one, with(8));
+}
+
+#[test]
+fn the_check_sees_what_is_wrong() {
+    let good = layout(&tiling("y-form"));
+    let mut swapped = good.clone();
+    swapped.quads[0].swap(0, 1);
+    assert!(verify(&swapped).iter().any(|p| p.contains("does not end where the next begins")));
+    let mut twice = good.clone();
+    twice.quads[0] = twice.quads[1];
+    assert!(verify(&twice).iter().any(|p| p.contains("times forwards and backwards")));
+    let mut lost = good;
+    let face = lost.quad_of_face.iter().position(|&q| q == 0).unwrap();
+    lost.quad_of_face[face] = 1;
+    assert!(!verify(&lost).is_empty());
+}
+
+#[test]
+fn a_tiling_that_is_none_is_refused() {
+    let mut broken = tiling("y-form");
+    broken.tile_of_face.iter_mut().for_each(|t| t.0 /= 2);
+    let halved = match_quads(&broken, &Parameters::default(), &Progress::silent());
+    assert!(matches!(halved, Err(QuadMatchingError::Tiling(_))), "{:?}", halved.map(|_| ()));
+    let mut short = tiling("y-form");
+    short.tile_of_face.pop();
+    let short = match_quads(&short, &Parameters::default(), &Progress::silent());
+    assert_eq!(
+        short.unwrap_err().to_string(),
+        "the tiling can not be dualized: its arrays do not fit together"
+    );
+}
+
+#[test]
+fn a_limit_on_corner_angles_is_a_gate() {
+    let tiling = tiling("y-form");
+    let parameters = Parameters { max_corner_angle: 95.0, ..Default::default() };
+    let refused = match_quads(&tiling, &parameters, &Progress::silent());
+    assert!(matches!(refused, Err(QuadMatchingError::ReflexCorner { .. })));
 }

@@ -55,7 +55,7 @@ pub fn tile(part: &Part, parameters: &Parameters, progress: &Progress) -> Result
     };
     densify(&mut refiner, area, spacing, parameters.faces_per_tile, progress)?;
     let curves = if parameters.follow_features { segments(&mut refiner, spacing) } else { Vec::new() };
-    let growth = Growth::new(&refiner, if curves.is_empty() { 0.0 } else { spacing });
+    let growth = Growth::new(&refiner, spacing, !curves.is_empty());
     let mut tessellation =
         Tessellation { refiner, growth, sites: Vec::new(), occupied: Vec::new(), spacing, progress };
     tessellation.anchor(&curves);
