@@ -131,7 +131,7 @@ mod tests {
 
     /// Brute force over all perfect matchings of a small cubic graph.
     fn best(count: usize, diagonals: &[Diagonal], parameters: &Parameters) -> Option<i128> {
-        fn go(free: u32, count: usize, diagonals: &[Diagonal], weights: &[i128]) -> Option<i128> {
+        fn go(free: u32, diagonals: &[Diagonal], weights: &[i128]) -> Option<i128> {
             if free == 0 {
                 return Some(0);
             }
@@ -144,12 +144,12 @@ mod tests {
                 .filter(|(d, _)| d.triangles.iter().all(|&t| free >> t & 1 == 1))
                 .filter_map(|(d, w)| {
                     let rest = free & !(1 << d.triangles[0]) & !(1 << d.triangles[1]);
-                    go(rest, count, diagonals, weights).map(|sum| sum + w)
+                    go(rest, diagonals, weights).map(|sum| sum + w)
                 })
                 .min()
         }
         let weights: Vec<i128> = diagonals.iter().map(|d| weight(d, parameters)).collect();
-        go((1 << count) - 1, count, diagonals, &weights)
+        go((1 << count) - 1, diagonals, &weights)
     }
 
     #[test]

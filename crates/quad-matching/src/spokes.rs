@@ -192,10 +192,10 @@ impl Cutter {
                 },
             );
         // A quarter of the radius off is hardly visible in the layout, and spares slivers.
-        if let Some(vertex) = nearest {
-            if self.map.at(vertex).length() < 0.25 {
-                return vertex;
-            }
+        if let Some(vertex) = nearest
+            && self.map.at(vertex).length() < 0.25
+        {
+            return vertex;
         }
         // The face around the centre; the one that contains it best if rounding leaves none.
         let score = |f: FaceId| -> (f64, [f64; 3]) {

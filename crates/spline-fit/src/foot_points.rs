@@ -17,14 +17,16 @@ pub(crate) fn correct(samples: &mut PatchSamples, patch: &Patch) {
             let off = sample.point - at.position;
             let (a, b, c) = (at.du.length_squared(), at.du.dot(at.dv), at.dv.length_squared());
             let determinant = a * c - b * b;
-            if !(determinant > 1e-12 * a * c) {
+            // Derivatives that are parallel or vanish give no direction.
+            if determinant.is_nan() || determinant <= 1e-12 * a * c {
                 break;
             }
             let (p, q) = (off.dot(at.du), off.dot(at.dv));
             let next_u = (u + (c * p - b * q) / determinant).clamp(0.0, 1.0);
             let next_v = (v + (a * q - b * p) / determinant).clamp(0.0, 1.0);
             let next = patch.evaluate(next_u, next_v);
-            if !(next.position.distance_squared(sample.point) < off.length_squared()) {
+            let nearer = next.position.distance_squared(sample.point) < off.length_squared();
+            if !nearer {
                 break;
             }
             (u, v, at) = (next_u, next_v, next);

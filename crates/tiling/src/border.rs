@@ -66,11 +66,12 @@ pub(crate) fn shape(refiner: &Refiner, growth: &Growth, faces: &[FaceId]) -> Sha
             break;
         }
     }
-    if runs.len() > 1 && runs[0].neighbor == runs[runs.len() - 1].neighbor {
-        if let Some(mut last) = runs.pop() {
-            last.half_edges.append(&mut runs[0].half_edges);
-            runs[0].half_edges = last.half_edges;
-        }
+    if runs.len() > 1
+        && runs[0].neighbor == runs[runs.len() - 1].neighbor
+        && let Some(mut last) = runs.pop()
+    {
+        last.half_edges.append(&mut runs[0].half_edges);
+        runs[0].half_edges = last.half_edges;
     }
     Shape::Disk(runs)
 }

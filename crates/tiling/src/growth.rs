@@ -159,11 +159,12 @@ impl Growth {
                 _ => fans.push((tile, vec![face])),
             }
         }
-        if fans.len() > 1 && fans[0].0 == fans[fans.len() - 1].0 {
-            if let Some((_, mut faces)) = fans.pop() {
-                faces.append(&mut fans[0].1);
-                fans[0].1 = faces;
-            }
+        if fans.len() > 1
+            && fans[0].0 == fans[fans.len() - 1].0
+            && let Some((_, mut faces)) = fans.pop()
+        {
+            faces.append(&mut fans[0].1);
+            fans[0].1 = faces;
         }
         fans
     }

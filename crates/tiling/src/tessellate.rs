@@ -295,7 +295,7 @@ impl Tessellation<'_> {
             }
             let corners = self.refiner.part().mesh.triangles[face.index()];
             let Some(vertex) = corners.into_iter().find(|&v| self.is_free(v)) else { continue };
-            if self.sites.len() % 64 == 0 {
+            if self.sites.len().is_multiple_of(64) {
                 self.progress.check()?;
                 self.progress.step(self.sites.len() as u64, count as u64, "sites");
             }

@@ -160,13 +160,13 @@ pub fn verify(tiling: &Tiling) -> Vec<Violation> {
         }
     }
 
-    if violations.is_empty() {
-        if let Some(genus) = connectivity.genus(mesh) {
-            let (_, shells) = connectivity.components();
-            let expected = 2 * tiles as i64 - 4 * shells as i64 + 4 * genus;
-            if corners != expected {
-                return inconsistent(format!("{corners} corners where {expected} are expected"));
-            }
+    if violations.is_empty()
+        && let Some(genus) = connectivity.genus(mesh)
+    {
+        let (_, shells) = connectivity.components();
+        let expected = 2 * tiles as i64 - 4 * shells as i64 + 4 * genus;
+        if corners != expected {
+            return inconsistent(format!("{corners} corners where {expected} are expected"));
         }
     }
     violations
