@@ -9,7 +9,7 @@ fn tile_colors() -> [Color; 12] {
     std::array::from_fn(|k| {
         // Five steps of 30 degrees at a time visit all twelve hues and keep consecutive colours far apart.
         let hue = (k * 150 % 360) as f64 + 15.0;
-        Color::from_oklch([0.82, 0.72, 0.88][k % 3], [0.09, 0.11, 0.07][k % 3], hue)
+        Color::from_oklch([0.85, 0.77, 0.90][k % 3], [0.08, 0.10, 0.06][k % 3], hue)
     })
 }
 
@@ -64,7 +64,7 @@ pub fn sequential(t: f64) -> Color {
     // The hue turns faster at the light end, where the eye sees the steps between green and yellow less.
     let hue = 305.0 - 195.0 * (0.75 * t + 0.25 * t * t);
     let chroma = 0.10 + 0.16 * t * (1.0 - t) + 0.06 * t;
-    Color::from_oklch(0.30 + 0.62 * t, chroma, hue)
+    Color::from_oklch(0.38 + 0.55 * t, chroma, hue)
 }
 
 #[cfg(test)]
