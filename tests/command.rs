@@ -456,6 +456,70 @@ fn an_interrupted_run_ends_with_130_and_the_next_one_finishes() {
     assert_eq!(events[1..3], ["stage-cached mesh", "stage-started smooth"]);
 }
 
+/// Whatever moment a process dies at, what it leaves is whole or not there.
+#[cfg(unix)]
+#[test]
+fn killed_runs_leave_nothing_that_misleads_the_next_one() {
+    let names = |shop: &Workshop| -> Vec<PathBuf> {
+        let root = shop.path(".topipe");
+        ["artifacts-v1", "keys-v1"]
+            .iter()
+            .flat_map(|bucket| files_below(&root.join(bucket)))
+            .map(|file| file.strip_prefix(&root).unwrap().to_owned())
+            // What was being written when the process died; it is under no name that anyone looks for.
+            .filter(|file| !file.file_name().unwrap().to_str().unwrap().starts_with(".topipe-"))
+            .collect()
+    };
+    let clean = Workshop::new();
+    clean.events(&[]);
+    let shop = Workshop::new();
+    for round in 0..16u64 {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
+            .current_dir(shop.folder.path())
+            .args(["-q", "run", "box.toml"])
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_micros(1500 * round));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    let last = shop.topipe(&["run", "box.toml"]);
+    assert_eq!(last.code, 0, "{}", last.stderr);
+    assert_eq!(names(&shop), names(&clean));
+    assert_eq!(shop.events(&[]), NOTHING);
+    assert_eq!(shop.topipe(&["cache", "verify"]).code, 0);
+    assert_eq!(shop.read("topipe-out/box/report.json"), clean.read("topipe-out/box/report.json"));
+}
+
+#[test]
+fn processes_on_one_cache_compute_each_result_once() {
+    let shop = Workshop::new();
+    let spawn = |k: usize| {
+        std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
+            .current_dir(shop.folder.path())
+            .args(["run", "box.toml", "--json", "--out", &format!("out{k}")])
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .unwrap()
+    };
+    let children: Vec<_> = (0..4).map(spawn).collect();
+    let mut log = String::new();
+    for child in children {
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        log += &String::from_utf8(output.stdout).unwrap();
+    }
+    for stage in ["mesh", "smooth", "check"] {
+        let finished = log.matches(&format!("\"stage-finished\",\"stage\":\"{stage}\"")).count();
+        assert_eq!(finished, 1, "{stage}");
+    }
+    for k in 1..4 {
+        assert_eq!(shop.read(&format!("out{k}/report.json")), shop.read("out0/report.json"));
+    }
+    assert!(files_below(&shop.path(".topipe/locks-v1")).is_empty());
+}
+
 fn files_below(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).into_iter().flatten() {

@@ -78,11 +78,12 @@ fn type_name(schema: &Value, definitions: &Value) -> String {
     }
     for union in ["oneOf", "anyOf"] {
         if let Some(variants) = schema.get(union).and_then(Value::as_array) {
-            let names: Vec<String> = variants
+            let mut names: Vec<String> = variants
                 .iter()
                 .filter(|variant| variant.get("type").and_then(Value::as_str) != Some("null"))
                 .map(|variant| type_name(variant, definitions))
                 .collect();
+            names.dedup();
             return names.join(" | ");
         }
     }
