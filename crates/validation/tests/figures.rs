@@ -6,6 +6,7 @@ use topipe_mesh::{
     TriangleMesh, VertexId,
 };
 use topipe_progress::Progress;
+use topipe_quad_matching::{MacroEdge, QuadLayout, Side};
 use topipe_skeleton::{Method, PointKind, Section, Skeleton};
 use topipe_spline_fit::{Basis, EdgeCurve, Patch, PatchSide, SplineSurface};
 use topipe_validation::{Inputs, Parameters, Report, ValidationError, validate, volume_by_quadrature};
@@ -322,6 +323,66 @@ fn a_control_point_that_is_not_shared_opens_a_gap_and_a_missing_patch_the_surfac
     open.patches.pop();
     let figures = report(&Inputs { surface: Some(&open), ..Inputs::of(&original) }).surface.unwrap();
     assert_eq!((figures.closed, figures.genus), (false, None));
+}
+
+/// The six sides of the cube as a layout over its own mesh.
+fn cube_layout(size: f64) -> QuadLayout {
+    let part = Part::new(cube(size));
+    let mut edges: Vec<MacroEdge> = Vec::new();
+    let quads = CUBE_SIDES.map(|corners| {
+        [0, 1, 2, 3].map(|k: usize| {
+            let ends = [corners[k], corners[(k + 1) % 4]];
+            let found = edges.iter().position(|e| e.ends == ends || e.ends == [ends[1], ends[0]]);
+            let edge = found.unwrap_or_else(|| {
+                edges.push(MacroEdge { ends, path: ends.map(VertexId).to_vec(), feature: None });
+                edges.len() - 1
+            });
+            Side { edge: edge as u32, reversed: edges[edge].ends != ends }
+        })
+    });
+    QuadLayout {
+        part,
+        vertices: (0..8).map(VertexId).collect(),
+        edges,
+        quads: quads.to_vec(),
+        quad_of_face: (0..12).map(|f| f / 2).collect(),
+        tiles: 8,
+        macro_triangles: 12,
+    }
+}
+
+#[test]
+fn the_layout_of_a_cube_and_of_a_bent_one() {
+    let original = Part::new(cube(3.0));
+    let of = |layout: &QuadLayout| {
+        report(&Inputs { layout: Some(layout), ..Inputs::of(&original) }).layout.unwrap()
+    };
+    let figures = of(&cube_layout(3.0));
+    assert_eq!((figures.tiles, figures.macro_triangles, figures.quads), (8, 12, 6));
+    assert_eq!((figures.genus, figures.valences.into_iter().collect::<Vec<_>>()), (Some(0), vec![(3, 8)]));
+    close(figures.max_corner_angle_deg, 90.0, 1e-12);
+    close(figures.min_scaled_jacobian, 1.0, 1e-15);
+
+    // A corner pushed towards the opposite one: on the side z = 1 it lies at (1/4, 1/4), and its sides run to (1, 0)
+    // and (0, 1) at an angle whose cosine is -3/5, seen from outside the side.
+    let mut bent = cube_layout(1.0);
+    bent.part.mesh.positions[7] = DVec3::new(0.25, 0.25, 1.0);
+    let figures = of(&bent);
+    let reflex = 360.0 - (-0.6f64).acos().to_degrees();
+    close(figures.max_corner_angle_deg, reflex, 1e-9);
+    assert!(figures.min_scaled_jacobian < 0.0);
+
+    let mut open = cube_layout(1.0);
+    open.quads.pop();
+    assert_eq!(of(&open).genus, None);
+    let mut broken = cube_layout(1.0);
+    broken.edges[3].path[1] = VertexId(6);
+    let result = validate(
+        &Inputs { layout: Some(&broken), ..Inputs::of(&original) },
+        &Parameters::default(),
+        &Progress::silent(),
+    );
+    assert!(matches!(result, Err(ValidationError::Artifact { artifact: "layout", .. })));
 }
 
 fn ring_skeleton(radius: f64, count: u32) -> Skeleton {
