@@ -1,74 +1,28 @@
 //! Stages in parallel, each as soon as what it depends on is there.
 
-use super::listener::StageListener;
+use super::failure::Failure;
+use super::produce::Settled;
 use super::{Events, FileRecord, InputRecord, Outcome, RunOptions, StageRecord};
 use crate::artifact::Value;
-use crate::cache::{Bucket, CacheError, Damage, KeyRecord, LockError};
+use crate::cache::{Bucket, Damage, KeyRecord};
 use crate::decide::{Decider, Decision, InputHashes};
 use crate::error::ExitCode;
 use crate::event::Event;
 use crate::hash::ContentHash;
 use crate::history::History;
-use crate::input_file::{self, InputFileError};
 use crate::interrupt::Interrupt;
 use crate::machine;
 use crate::reason::Reason;
 use crate::spec::StageNode;
-use crate::stage::{SourceFile, StageContext, StageError};
-use std::collections::BTreeMap;
-use std::panic::AssertUnwindSafe;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
-use topipe_progress::Progress;
-
-/// Why a stage or an export came to nothing.
-#[derive(Debug, Clone)]
-pub(super) struct Failure {
-    pub(super) message: String,
-    pub(super) code: ExitCode,
-}
-
-impl From<StageError> for Failure {
-    fn from(error: StageError) -> Self {
-        let code = match error {
-            StageError::Refused(_) => ExitCode::Refused,
-            StageError::BadParameter(_) => ExitCode::Usage,
-            StageError::Failed(_) => ExitCode::StageFailed,
-            StageError::Interrupted => ExitCode::Interrupted,
-        };
-        Self { message: error.to_string(), code }
-    }
-}
-
-impl From<CacheError> for Failure {
-    fn from(error: CacheError) -> Self {
-        Self { message: error.to_string(), code: ExitCode::Storage }
-    }
-}
-
-impl From<InputFileError> for Failure {
-    fn from(error: InputFileError) -> Self {
-        Self { message: error.to_string(), code: ExitCode::Storage }
-    }
-}
-
-impl From<LockError> for Failure {
-    fn from(error: LockError) -> Self {
-        let code = match error {
-            LockError::Interrupted => ExitCode::Interrupted,
-            _ => ExitCode::Storage,
-        };
-        Self { message: error.to_string(), code }
-    }
-}
 
 /// What is known about a stage so far.
 #[derive(Default)]
-struct Slot {
+pub(super) struct Slot {
     outcome: Option<Outcome>,
-    reasons: Vec<Reason>,
+    pub(super) reasons: Vec<Reason>,
     key: Option<ContentHash>,
-    record: Option<KeyRecord>,
+    pub(super) record: Option<KeyRecord>,
     peak_memory: Option<u64>,
 }
 
@@ -87,34 +41,21 @@ struct Schedule {
     stopping: bool,
 }
 
-/// The result of a computation.
-struct Produced {
-    value: Value,
-    record: KeyRecord,
-}
-
-/// What came of asking for a result under its lock.
-enum Settled {
-    Produced(Produced),
-    /// Another process made it while we waited.
-    Found(KeyRecord),
-}
-
 pub(super) struct Executor<'a> {
-    decider: &'a Decider<'a>,
+    pub(super) decider: &'a Decider<'a>,
     pub(super) options: &'a RunOptions,
-    interrupt: &'a Interrupt,
+    pub(super) interrupt: &'a Interrupt,
     pub(super) events: Arc<Events>,
     order: Vec<usize>,
-    slots: Vec<Mutex<Slot>>,
+    pub(super) slots: Vec<Mutex<Slot>>,
     /// Results in memory, so that the next stage need not decode them. The lock is held while one is fetched.
-    values: Vec<Mutex<Option<Value>>>,
+    pub(super) values: Vec<Mutex<Option<Value>>>,
     schedule: Mutex<Schedule>,
     wake: Condvar,
 }
 
 /// A thread that panicked while it held one of our locks was inside of a sink; our data are whole.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -156,7 +97,7 @@ impl<'a> Executor<'a> {
         self.decider.selection.selected.contains(&stage)
     }
 
-    fn node(&self, stage: usize) -> &StageNode {
+    pub(super) fn node(&self, stage: usize) -> &StageNode {
         &self.decider.pipeline.stages[stage]
     }
 
@@ -292,7 +233,7 @@ impl<'a> Executor<'a> {
         slot.record = Some(record);
     }
 
-    fn computed(&self, stage: usize, record: KeyRecord) {
+    pub(super) fn computed(&self, stage: usize, record: KeyRecord) {
         self.events.emit(&Event::StageFinished {
             stage: self.node(stage).name.clone(),
             artifact: record.artifact,
@@ -316,126 +257,13 @@ impl<'a> Executor<'a> {
     }
 
     /// Passes on the damages that `action` finds.
-    fn with_damages<T>(&self, action: impl FnOnce(&mut Vec<Damage>) -> T) -> T {
+    pub(super) fn with_damages<T>(&self, action: impl FnOnce(&mut Vec<Damage>) -> T) -> T {
         let mut damages = Vec::new();
         let result = action(&mut damages);
         for Damage { path, reason, moved_to } in damages {
             self.events.emit(&Event::Quarantined { path, reason, moved_to });
         }
         result
-    }
-
-    /// Computes and commits a result, unless, with `look_again`, another process turns out to have done so.
-    fn produce(
-        &self,
-        stage: usize,
-        key: ContentHash,
-        reasons: Vec<Reason>,
-        look_again: bool,
-    ) -> Result<Settled, Failure> {
-        let node = self.node(stage);
-        let mut waiting = |holder: &str| {
-            self.events.emit(&Event::StageWaiting { stage: node.name.clone(), holder: holder.to_owned() });
-        };
-        let interrupted = || self.interrupt.is_raised();
-        let _lock = self.cache().lock(key, self.options.lock_timeout, &interrupted, &mut waiting)?;
-        if look_again && let Some(record) = self.with_damages(|damages| self.decider.lookup(key, damages))? {
-            return Ok(Settled::Found(record));
-        }
-        self.events.emit(&Event::StageStarted { stage: node.name.clone(), key, reasons });
-        let mut inputs = BTreeMap::new();
-        for (&port, &from) in &node.inputs {
-            inputs.insert(port, self.obtain(from)?);
-        }
-        let files = self.read_files(stage)?;
-        let listener =
-            Arc::new(StageListener::new(&node.name, self.interrupt.clone(), Arc::clone(&self.events)));
-        let progress = Progress::new(listener.clone());
-        let context = StageContext { inputs, files, progress: &progress };
-        let start = Instant::now();
-        // What the stage may have left half done is its own: inputs are shared read-only.
-        let result =
-            std::panic::catch_unwind(AssertUnwindSafe(|| node.stage.run(&context, &node.parameters)));
-        let value = match result {
-            Ok(value) => value?,
-            Err(payload) => return Err(panicked(payload.as_ref()).into()),
-        };
-        let seconds = start.elapsed().as_secs_f64();
-        let stored = self.cache().store(&node.stage.output(), &value)?;
-        let record = KeyRecord {
-            key,
-            kind: node.stage.kind().to_owned(),
-            artifact: stored.hash,
-            bytes: stored.bytes,
-            seconds,
-            remarks: listener.remarks(),
-        };
-        let before = self.with_damages(|damages| self.cache().key_record(key, damages))?;
-        if before.is_some_and(|before| before.artifact != record.artifact) {
-            tracing::warn!("stage `{}` gave another result than before from the same input", node.name);
-        }
-        self.cache().publish(&record)?;
-        Ok(Settled::Produced(Produced { value, record }))
-    }
-
-    fn read_files(&self, stage: usize) -> Result<BTreeMap<String, SourceFile>, Failure> {
-        let node = self.node(stage);
-        let mut files = BTreeMap::new();
-        for (field, (_, hash)) in self.decider.files(stage) {
-            let path = &node.files[field].path;
-            let bytes = input_file::read_input(path, *hash)?.into();
-            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-            files.insert(field.clone(), SourceFile { name, bytes });
-        }
-        Ok(files)
-    }
-
-    /// The result of a stage that has been settled: from memory, from the cache, or, if it is damaged or gone there,
-    /// computed once more.
-    pub(super) fn obtain(&self, stage: usize) -> Result<Value, Failure> {
-        let node = self.node(stage);
-        let mut value = lock(&self.values[stage]);
-        if let Some(value) = value.as_ref() {
-            return Ok(Arc::clone(value));
-        }
-        let Some(record) = lock(&self.slots[stage]).record.clone() else {
-            let message = format!("stage `{}` has no result", node.name);
-            return Err(Failure { message, code: ExitCode::StageFailed });
-        };
-        let output = node.stage.output();
-        let load = || {
-            self.with_damages(|damages| {
-                self.cache().load(&output, record.artifact, damages).map(|value| (value, !damages.is_empty()))
-            })
-        };
-        let (loaded, damaged) = load()?;
-        let found = match loaded {
-            Some(found) => found,
-            None => {
-                let reason = if damaged { Reason::ResultDamaged } else { Reason::ResultMissing };
-                match self.produce(stage, record.key, vec![reason.clone()], true)? {
-                    Settled::Found(_) => load()?.0.ok_or_else(|| Failure {
-                        message: format!("the result of stage `{}` vanishes from the cache", node.name),
-                        code: ExitCode::Storage,
-                    })?,
-                    Settled::Produced(produced) if produced.record.artifact == record.artifact => {
-                        lock(&self.slots[stage]).reasons = vec![reason];
-                        self.computed(stage, produced.record);
-                        produced.value
-                    }
-                    Settled::Produced(_) => {
-                        let message = format!(
-                            "the result of stage `{}` was lost and came out different when it was computed again; \
-                             run again",
-                            node.name
-                        );
-                        return Err(Failure { message, code: ExitCode::Storage });
-                    }
-                }
-            }
-        };
-        *value = Some(Arc::clone(&found));
-        Ok(found)
     }
 
     /// Remembers what the stages were run with, to explain the next plan.
@@ -503,14 +331,4 @@ impl<'a> Executor<'a> {
             peak_memory_bytes: slot.peak_memory,
         }
     }
-}
-
-/// A panic as a failure of its stage.
-fn panicked(payload: &(dyn std::any::Any + Send)) -> StageError {
-    let text = payload
-        .downcast_ref::<&str>()
-        .map(|text| (*text).to_owned())
-        .or_else(|| payload.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "no message".into());
-    StageError::Failed(format!("the stage panicked, which is a defect of topipe: {text}"))
 }

@@ -1,6 +1,7 @@
 //! Writing artifacts into the output folder, and leaving alone what is there already.
 
-use super::executor::{Executor, Failure};
+use super::executor::Executor;
+use super::failure::Failure;
 use super::{ExportOutcome, ExportRecord};
 use crate::cache::{Bucket, CacheError, persist};
 use crate::error::ExitCode;

@@ -2,7 +2,9 @@
 
 mod executor;
 mod export;
+mod failure;
 mod listener;
+mod produce;
 mod record;
 
 pub use record::{

@@ -1,0 +1,156 @@
+//! Making one result, and getting at those that are there.
+
+use super::executor::{Executor, lock};
+use super::failure::Failure;
+use super::listener::StageListener;
+use crate::artifact::Value;
+use crate::cache::KeyRecord;
+use crate::error::ExitCode;
+use crate::event::Event;
+use crate::hash::ContentHash;
+use crate::input_file;
+use crate::reason::Reason;
+use crate::stage::{SourceFile, StageContext, StageError};
+use std::collections::BTreeMap;
+use std::panic::AssertUnwindSafe;
+use std::sync::Arc;
+use std::time::Instant;
+use topipe_progress::Progress;
+
+/// The result of a computation.
+pub(super) struct Produced {
+    pub(super) value: Value,
+    pub(super) record: KeyRecord,
+}
+
+/// What came of asking for a result under its lock.
+pub(super) enum Settled {
+    Produced(Produced),
+    /// Another process made it while we waited.
+    Found(KeyRecord),
+}
+
+impl Executor<'_> {
+    /// Computes and commits a result, unless, with `look_again`, another process turns out to have done so.
+    pub(super) fn produce(
+        &self,
+        stage: usize,
+        key: ContentHash,
+        reasons: Vec<Reason>,
+        look_again: bool,
+    ) -> Result<Settled, Failure> {
+        let node = self.node(stage);
+        let mut waiting = |holder: &str| {
+            self.events.emit(&Event::StageWaiting { stage: node.name.clone(), holder: holder.to_owned() });
+        };
+        let interrupted = || self.interrupt.is_raised();
+        let _lock = self.cache().lock(key, self.options.lock_timeout, &interrupted, &mut waiting)?;
+        if look_again && let Some(record) = self.with_damages(|damages| self.decider.lookup(key, damages))? {
+            return Ok(Settled::Found(record));
+        }
+        self.events.emit(&Event::StageStarted { stage: node.name.clone(), key, reasons });
+        let mut inputs = BTreeMap::new();
+        for (&port, &from) in &node.inputs {
+            inputs.insert(port, self.obtain(from)?);
+        }
+        let files = self.read_files(stage)?;
+        let listener =
+            Arc::new(StageListener::new(&node.name, self.interrupt.clone(), Arc::clone(&self.events)));
+        let progress = Progress::new(listener.clone());
+        let context = StageContext { inputs, files, progress: &progress };
+        let start = Instant::now();
+        // What the stage may have left half done is its own: inputs are shared read-only.
+        let result =
+            std::panic::catch_unwind(AssertUnwindSafe(|| node.stage.run(&context, &node.parameters)));
+        let value = match result {
+            Ok(value) => value?,
+            Err(payload) => return Err(panicked(payload.as_ref()).into()),
+        };
+        let seconds = start.elapsed().as_secs_f64();
+        let stored = self.cache().store(&node.stage.output(), &value)?;
+        let record = KeyRecord {
+            key,
+            kind: node.stage.kind().to_owned(),
+            artifact: stored.hash,
+            bytes: stored.bytes,
+            seconds,
+            remarks: listener.remarks(),
+        };
+        let before = self.with_damages(|damages| self.cache().key_record(key, damages))?;
+        if before.is_some_and(|before| before.artifact != record.artifact) {
+            tracing::warn!("stage `{}` gave another result than before from the same input", node.name);
+        }
+        self.cache().publish(&record)?;
+        Ok(Settled::Produced(Produced { value, record }))
+    }
+
+    fn read_files(&self, stage: usize) -> Result<BTreeMap<String, SourceFile>, Failure> {
+        let node = self.node(stage);
+        let mut files = BTreeMap::new();
+        for (field, (_, hash)) in self.decider.files(stage) {
+            let path = &node.files[field].path;
+            let bytes = input_file::read_input(path, *hash)?.into();
+            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            files.insert(field.clone(), SourceFile { name, bytes });
+        }
+        Ok(files)
+    }
+
+    /// The result of a stage that has been settled: from memory, from the cache, or, if it is damaged or gone there,
+    /// computed once more.
+    pub(super) fn obtain(&self, stage: usize) -> Result<Value, Failure> {
+        let node = self.node(stage);
+        let mut value = lock(&self.values[stage]);
+        if let Some(value) = value.as_ref() {
+            return Ok(Arc::clone(value));
+        }
+        let Some(record) = lock(&self.slots[stage]).record.clone() else {
+            let message = format!("stage `{}` has no result", node.name);
+            return Err(Failure { message, code: ExitCode::StageFailed });
+        };
+        let output = node.stage.output();
+        let load = || {
+            self.with_damages(|damages| {
+                self.cache().load(&output, record.artifact, damages).map(|value| (value, !damages.is_empty()))
+            })
+        };
+        let (loaded, damaged) = load()?;
+        let found = match loaded {
+            Some(found) => found,
+            None => {
+                let reason = if damaged { Reason::ResultDamaged } else { Reason::ResultMissing };
+                match self.produce(stage, record.key, vec![reason.clone()], true)? {
+                    Settled::Found(_) => load()?.0.ok_or_else(|| Failure {
+                        message: format!("the result of stage `{}` vanishes from the cache", node.name),
+                        code: ExitCode::Storage,
+                    })?,
+                    Settled::Produced(produced) if produced.record.artifact == record.artifact => {
+                        lock(&self.slots[stage]).reasons = vec![reason];
+                        self.computed(stage, produced.record);
+                        produced.value
+                    }
+                    Settled::Produced(_) => {
+                        let message = format!(
+                            "the result of stage `{}` was lost and came out different when it was computed again; \
+                             run again",
+                            node.name
+                        );
+                        return Err(Failure { message, code: ExitCode::Storage });
+                    }
+                }
+            }
+        };
+        *value = Some(Arc::clone(&found));
+        Ok(found)
+    }
+}
+
+/// A panic as a failure of its stage.
+fn panicked(payload: &(dyn std::any::Any + Send)) -> StageError {
+    let text = payload
+        .downcast_ref::<&str>()
+        .map(|text| (*text).to_owned())
+        .or_else(|| payload.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "no message".into());
+    StageError::Failed(format!("the stage panicked, which is a defect of topipe: {text}"))
+}
