@@ -48,12 +48,15 @@ impl<'a> Surface<'a> {
         Self { index: SurfaceIndex::build(triangulation), samples, refine: Some(refine) }
     }
 
-    pub(crate) fn distance(&self, p: DVec3) -> f64 {
-        match (self.index.nearest(p), &self.refine) {
-            (None, _) => f64::INFINITY,
-            (Some(nearest), None) => nearest.distance,
-            (Some(nearest), Some(refine)) => refine(p, &nearest),
-        }
+    /// The distance of `p`. `near` is a point of the triangulation, best that of the sample before: the search need
+    /// not look farther than it. It is left at the nearest point found. Halves the time on the bell crank;
+    /// the result is the same up to rounding.
+    pub(crate) fn distance(&self, p: DVec3, near: &mut Option<DVec3>) -> f64 {
+        // A little more than the distance, so that rounding does not exclude the point itself.
+        let limited = near.and_then(|q| self.index.nearest_within(p, p.distance(q) * (1.0 + 1e-9)));
+        let Some(nearest) = limited.or_else(|| self.index.nearest(p)) else { return f64::INFINITY };
+        *near = Some(nearest.point);
+        self.refine.as_ref().map_or(nearest.distance, |refine| refine(p, &nearest))
     }
 }
 
@@ -69,7 +72,10 @@ fn side(from: &Surface<'_>, to: &Surface<'_>) -> Option<Side> {
     let mut distances: Vec<(f64, f64)> = from
         .samples
         .par_chunks(CHUNK)
-        .flat_map_iter(|chunk| chunk.iter().map(|&(p, weight)| (to.distance(p), weight)))
+        .flat_map_iter(|chunk| {
+            let mut near = None;
+            chunk.iter().map(move |&(p, weight)| (to.distance(p, &mut near), weight))
+        })
         .collect();
     let area: f64 = distances.iter().map(|&(_, weight)| weight).sum();
     if !(area > 0.0 && area.is_finite()) {
@@ -155,5 +161,18 @@ mod tests {
         let flat =
             TriangleMesh::from_arrays(vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], vec![[0, 1, 2]]);
         assert_eq!(between(&Surface::of_mesh(&flat), &Surface::of_mesh(&plate(0.0, 1.0)), 1.0), None);
+    }
+
+    #[test]
+    fn the_sample_before_only_saves_time() {
+        let surface = Surface::of_mesh(&plate(0.0, 2.0));
+        let mut near = None;
+        for k in 0..500 {
+            // A path that jumps to and fro, over the plate and beyond its sides.
+            let t = f64::from(k);
+            let p = DVec3::new(3.0 * (0.7 * t).sin(), 3.0 * (1.9 * t).cos(), (0.3 * t).sin());
+            let (limited, free) = (surface.distance(p, &mut near), surface.distance(p, &mut None));
+            assert!((limited - free).abs() <= 1e-14, "{limited} {free}");
+        }
     }
 }

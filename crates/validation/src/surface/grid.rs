@@ -150,7 +150,7 @@ mod tests {
             for offset in [0.0, 0.05, -0.05] {
                 let p = s.position + s.normal() * offset;
                 let nearest = sampled.index.nearest(p).unwrap();
-                let found = sampled.distance(p);
+                let found = sampled.distance(p, &mut None);
                 assert!((found - offset.abs()).abs() < 1e-8, "{found} for {offset} at ({u}, {v})");
                 chords = chords.max((nearest.distance - offset.abs()).abs());
             }
