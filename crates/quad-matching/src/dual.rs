@@ -1,12 +1,13 @@
 //! The dual of a tiling, and the layout that its matching gives.
 
 use crate::matching::{DOUBLET_PENALTY, Diagonal, perfect_matching, widest_corner};
+use crate::refine::{Quads, Regions, refine};
 use crate::sides::{FeaturePath, TileSide, Tiled, feature_paths, midpoints, tile_sides};
 use crate::spokes::{self, SpokeTask};
-use crate::{MacroEdge, Parameters, QuadLayout, QuadMatchingError, Side};
+use crate::{MacroEdge, Pairing, Parameters, QuadLayout, QuadMatchingError, Side};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};
-use topipe_mesh::{FaceId, HalfEdgeId, Part, VertexId};
+use topipe_mesh::{FaceId, HalfEdgeId, Part, TriangleMesh, VertexId};
 use topipe_progress::Progress;
 use topipe_tiling::Tiling;
 
@@ -34,67 +35,206 @@ pub fn match_quads(
     let edge_of: BTreeMap<[u32; 2], u32> =
         edges.iter().enumerate().map(|(i, e)| (e.ends, i as u32)).collect();
     let mut diagonals = diagonals(&tiled, &sites, &edges, &triangles, &edge_of)?;
-    let partner = match_without_doublets(sites.len(), triangles.len(), &edges, &mut diagonals, parameters);
-    let single = partner.iter().filter(|p| p.is_none()).count();
-    if single > 0 {
-        return Err(QuadMatchingError::NoPerfectMatching { single, all: triangles.len() });
-    }
+    let macro_edges: HashSet<[VertexId; 2]> =
+        edges.iter().flat_map(|e| e.path.windows(2)).map(|w| [w[0].min(w[1]), w[0].max(w[1])]).collect();
+    let triangle_of_face = flood_triangles(&tiled, &triangles, &macro_edges)?;
+    let partner = match parameters.pairing {
+        Pairing::Perfect => {
+            let partner =
+                match_without_doublets(sites.len(), triangles.len(), &edges, &mut diagonals, parameters);
+            let single = partner.iter().filter(|p| p.is_none()).count();
+            if single > 0 {
+                return Err(QuadMatchingError::NoPerfectMatching { single, all: triangles.len() });
+            }
+            partner
+        }
+        Pairing::Refined => {
+            let angles = surface_angles(&tiled, &sites, &triangles, &triangle_of_face);
+            match_good_pairs(&sites, &triangles, &edges, &diagonals, &angles, parameters)
+        }
+    };
     progress.check()?;
     let followed = edges.iter().filter(|e| e.feature.is_some()).count();
-    let lost = (0..edges.len()).filter(|&i| edges[i].feature.is_some() && partner.contains(&Some(i))).count();
+    let lost: HashSet<usize> =
+        partner.iter().flatten().copied().filter(|&i| edges[i].feature.is_some()).collect();
     progress.remark(&format!(
-        "{followed} macro-edges follow features, {lost} of them were removed by the matching"
+        "{followed} macro-edges follow features, {} of them were removed by the matching",
+        lost.len()
     ));
 
-    // Each matched diagonal makes one quad.
+    // Each matched diagonal makes one region of four sides; a triangle left over is a region of its own.
     let side = |from: u32, to: u32| -> Result<Side, QuadMatchingError> {
         let edge = edge_of
             .get(&[from.min(to), from.max(to)])
             .ok_or_else(|| QuadMatchingError::Tiling(format!("tiles {from} and {to} do not meet")))?;
         Ok(Side { edge: *edge, reversed: from > to })
     };
-    let mut quads = Vec::with_capacity(triangles.len() / 2);
-    let mut quad_of_triangle = vec![0u32; triangles.len()];
-    let mut widest: Vec<f64> = Vec::with_capacity(triangles.len() / 2);
-    for t in 0..triangles.len() {
-        let Some(i) = partner[t] else { continue };
-        let [t1, t2] = diagonals[i].triangles;
-        if t as u32 != t1 {
-            continue;
-        }
-        let [o1, d1, d2] = rotated_to(&triangles[t1 as usize], edges[i].ends);
-        let [o2, ..] = rotated_to(&triangles[t2 as usize], edges[i].ends);
-        quad_of_triangle[t1 as usize] = quads.len() as u32;
-        quad_of_triangle[t2 as usize] = quads.len() as u32;
-        quads.push([side(o1, d1)?, side(d1, o2)?, side(o2, d2)?, side(d2, o1)?]);
-        widest.push(widest_corner(diagonals[i].corners).to_degrees());
+    let mut regions: Vec<Vec<Side>> = Vec::with_capacity(triangles.len());
+    let mut region_of_triangle = vec![0u32; triangles.len()];
+    for (t, triangle) in triangles.iter().enumerate() {
+        let corners = match partner[t] {
+            None => triangle.tiles.to_vec(),
+            Some(i) => {
+                let [t1, t2] = diagonals[i].triangles;
+                if t as u32 != t1 {
+                    continue;
+                }
+                let [o1, d1, d2] = rotated_to(triangle, edges[i].ends);
+                let [o2, ..] = rotated_to(&triangles[t2 as usize], edges[i].ends);
+                region_of_triangle[t2 as usize] = regions.len() as u32;
+                vec![o1, d1, o2, d2]
+            }
+        };
+        region_of_triangle[t] = regions.len() as u32;
+        let n = corners.len();
+        regions.push((0..n).map(|k| side(corners[k], corners[(k + 1) % n])).collect::<Result<_, _>>()?);
     }
-    let above = widest.iter().filter(|&&w| w > parameters.max_corner_angle).count();
-    if above > 0 {
-        return Err(QuadMatchingError::ReflexCorner {
-            quads: above,
-            limit: parameters.max_corner_angle,
-            widest: widest.iter().copied().fold(0.0, f64::max),
-        });
-    }
+    let region_of_face: Vec<u32> = triangle_of_face.iter().map(|&t| region_of_triangle[t as usize]).collect();
 
-    let macro_edges: HashSet<[VertexId; 2]> =
-        edges.iter().flat_map(|e| e.path.windows(2)).map(|w| [w[0].min(w[1]), w[0].max(w[1])]).collect();
-    let triangle_of_face = flood_triangles(&tiled, &triangles, &macro_edges)?;
-    let quad_of_face = triangle_of_face.iter().map(|&t| quad_of_triangle[t as usize]).collect();
-    let (part, _): (Part, Vec<FaceId>) = tiled.refiner.finish();
+    let macro_triangles = triangles.len() as u32;
+    let quads = match parameters.pairing {
+        Pairing::Perfect => Quads {
+            quads: regions.iter().filter_map(|sides| sides[..].try_into().ok()).collect(),
+            vertices: sites,
+            edges,
+            quad_of_face: region_of_face,
+            tiled,
+        },
+        Pairing::Refined => {
+            let (edges, sides) = without_removed(edges, regions, &partner);
+            tiled.tile_of_face = region_of_face;
+            let regions = Regions { tiled, vertices: sites, edges, sides };
+            refine(regions, parameters.snap, progress)?
+        }
+    };
+    let (part, _): (Part, Vec<FaceId>) = quads.tiled.refiner.finish();
     let mut layout = QuadLayout {
         part,
-        vertices: sites,
-        edges,
-        quads,
-        quad_of_face,
+        vertices: quads.vertices,
+        edges: quads.edges,
+        quads: quads.quads,
+        quad_of_face: quads.quad_of_face,
         tiles: tiles as u32,
-        macro_triangles: triangles.len() as u32,
+        macro_triangles,
     };
     crate::doublets::merge(&mut layout);
     crate::doublets::compact(&mut layout);
+    check_corners(&layout, parameters)?;
     Ok(layout)
+}
+
+/// The gate on corner angles.
+fn check_corners(layout: &QuadLayout, parameters: &Parameters) -> Result<(), QuadMatchingError> {
+    let angles = layout.corner_angles();
+    let limit = parameters.max_corner_angle;
+    let widest = |corners: &[f64; 4]| corners.iter().fold(0.0f64, |a, &b| a.max(b)).to_degrees();
+    let above = angles.iter().filter(|corners| widest(corners) > limit).count();
+    if above > 0 {
+        let widest = angles.iter().map(widest).fold(0.0, f64::max);
+        return Err(QuadMatchingError::ReflexCorner { quads: above, limit, widest });
+    }
+    Ok(())
+}
+
+/// The angles of each macro-triangle at its three sites, as sums of the angles of its faces, radians.
+fn surface_angles(
+    tiled: &Tiled,
+    sites: &[VertexId],
+    triangles: &[MacroTriangle],
+    triangle_of_face: &[u32],
+) -> Vec<[f64; 3]> {
+    let mut angles = vec![[0.0; 3]; triangles.len()];
+    for (site, &vertex) in sites.iter().enumerate() {
+        for h in tiled.refiner.outgoing(vertex) {
+            let t = triangle_of_face[h.face().index()] as usize;
+            if let Some(k) = triangles[t].tiles.iter().position(|&tile| tile as usize == site) {
+                angles[t][k] += face_angle(&tiled.refiner.part().mesh, h);
+            }
+        }
+    }
+    angles
+}
+
+/// The angle of a face at the origin of one of its half-edges; zero where it has none.
+pub(crate) fn face_angle(mesh: &TriangleMesh, h: HalfEdgeId) -> f64 {
+    let at = mesh.position(mesh.origin(h));
+    let angle = (mesh.position(mesh.target(h)) - at).angle_between(mesh.position(mesh.origin(h.prev())) - at);
+    if angle.is_finite() { angle } else { 0.0 }
+}
+
+/// Pairs as many triangles as give good quads: no feature between them, no corner wider than the limit, neither
+/// along the surface nor between the corner points, and no doublet.
+fn match_good_pairs(
+    sites: &[VertexId],
+    triangles: &[MacroTriangle],
+    edges: &[MacroEdge],
+    diagonals: &[Diagonal],
+    angles: &[[f64; 3]],
+    parameters: &Parameters,
+) -> Vec<Option<usize>> {
+    let limit = parameters.pair_angle.to_radians();
+    let angle_at = |t: u32, tile: u32| {
+        let k = triangles[t as usize].tiles.iter().position(|&other| other == tile);
+        k.map_or(0.0, |k| angles[t as usize][k])
+    };
+    let good: Vec<usize> = (0..diagonals.len())
+        .filter(|&i| {
+            let [t1, t2] = diagonals[i].triangles;
+            let across = edges[i].ends.iter().map(|&d| angle_at(t1, d) + angle_at(t2, d));
+            let apexes = [t1, t2].map(|t| angle_at(t, rotated_to(&triangles[t as usize], edges[i].ends)[0]));
+            !diagonals[i].feature
+                && widest_corner(diagonals[i].corners) <= limit
+                && across.chain(apexes).all(|angle| angle <= limit)
+        })
+        .collect();
+    let chosen: Vec<Diagonal> = good.iter().map(|&i| diagonals[i]).collect();
+    let mut partner: Vec<Option<usize>> = perfect_matching(triangles.len(), &chosen, parameters)
+        .into_iter()
+        .map(|partner| partner.map(|k| good[k]))
+        .collect();
+    // A site with only two regions left gets an edge back: its lowest pair is taken apart.
+    let mut valence = vec![0u32; sites.len()];
+    let mut removed: Vec<Vec<usize>> = vec![Vec::new(); sites.len()];
+    edges.iter().flat_map(|e| e.ends).for_each(|site| valence[site as usize] += 1);
+    for (t, &pair) in partner.iter().enumerate() {
+        let Some(i) = pair.filter(|&i| diagonals[i].triangles[0] == t as u32) else { continue };
+        for site in edges[i].ends {
+            valence[site as usize] -= 1;
+            removed[site as usize].push(i);
+        }
+    }
+    for site in 0..sites.len() {
+        for &i in &removed[site] {
+            let apart = diagonals[i].triangles.iter().all(|&t| partner[t as usize] != Some(i));
+            if valence[site] >= 3 || apart {
+                continue;
+            }
+            diagonals[i].triangles.iter().for_each(|&t| partner[t as usize] = None);
+            edges[i].ends.iter().for_each(|&end| valence[end as usize] += 1);
+        }
+    }
+    partner
+}
+
+/// Drops the macro-edges that were removed by the matching and renumbers the sides.
+fn without_removed(
+    edges: Vec<MacroEdge>,
+    mut regions: Vec<Vec<Side>>,
+    partner: &[Option<usize>],
+) -> (Vec<MacroEdge>, Vec<Vec<Side>>) {
+    let removed: HashSet<usize> = partner.iter().flatten().copied().collect();
+    let mut number = vec![u32::MAX; edges.len()];
+    let mut kept = Vec::with_capacity(edges.len());
+    for (i, edge) in edges.into_iter().enumerate() {
+        if !removed.contains(&i) {
+            number[i] = kept.len() as u32;
+            kept.push(edge);
+        }
+    }
+    for side in regions.iter_mut().flatten() {
+        side.edge = number[side.edge as usize];
+    }
+    (kept, regions)
 }
 
 /// A macro-triangle: three tiles counter-clockwise around a corner vertex of the tiling.

@@ -1,7 +1,9 @@
 //! The quadrilateral layout: macro-vertices, macro-edges and macro-quads over a refined mesh.
 
+use crate::dual::face_angle;
 use serde::{Deserialize, Serialize};
-use topipe_mesh::{FeatureKind, Part, VertexId};
+use std::collections::HashMap;
+use topipe_mesh::{FeatureKind, HalfEdgeId, Part, VertexId};
 
 /// A side of a macro-quad: a macro-edge and the direction in which the quad runs along it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -65,6 +67,27 @@ impl QuadLayout {
     /// The macro-vertices at the corners of a quad, counter-clockwise; corner `k` starts side `k`.
     pub fn corners(&self, quad: usize) -> [u32; 4] {
         self.quads[quad].map(|side| self.start(side))
+    }
+
+    /// The angles at the corners of each quad, radians, in the order of [`Self::corners`]: the sums of the angles of
+    /// the quad's faces there.
+    pub fn corner_angles(&self) -> Vec<[f64; 4]> {
+        let mesh = &self.part.mesh;
+        let mut corner_at: HashMap<VertexId, Vec<(u32, usize)>> = HashMap::new();
+        for quad in 0..self.quads.len() {
+            for (k, v) in self.corners(quad).into_iter().enumerate() {
+                corner_at.entry(self.vertices[v as usize]).or_default().push((quad as u32, k));
+            }
+        }
+        let mut angles = vec![[0.0; 4]; self.quads.len()];
+        for h in (0..3 * mesh.face_count()).map(HalfEdgeId::new) {
+            let Some(corners) = corner_at.get(&mesh.origin(h)) else { continue };
+            let quad = self.quad_of_face[h.face().index()];
+            if let Some(&(quad, k)) = corners.iter().find(|c| c.0 == quad) {
+                angles[quad as usize][k] += face_angle(mesh, h);
+            }
+        }
+        angles
     }
 
     /// The valence of each macro-vertex: the number of quad corners at it.

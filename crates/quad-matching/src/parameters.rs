@@ -4,10 +4,26 @@ use crate::QuadMatchingError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// How macro-triangles become quads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pairing {
+    /// Pairs that make good quads are matched, then everything is refined once: a quad gives four quads, a triangle
+    /// three. No corner is forced to be reflex, no feature edge is given up.
+    #[default]
+    Refined,
+    /// Every triangle is paired (source, section 2.2): a quarter of the patches, at the price of some bad corners.
+    Perfect,
+}
+
 /// Parameters of the layout. Angles are in degrees, all else is dimensionless.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Parameters {
+    /// How macro-triangles become quads: "refined" or "perfect".
+    pub pairing: Pairing,
+    /// Two triangles are paired for refinement only where no corner of their quad is wider than this, degrees.
+    pub pair_angle: f64,
     /// Corners wider than this, in degrees, begin to cost in the matching: exp((angle - soft) / 5).
     pub soft_corner_angle: f64,
     /// The layout is refused when a corner is wider than this, in degrees (a patch folds at 180); 360 = never.
@@ -18,7 +34,13 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self { soft_corner_angle: 120.0, max_corner_angle: 360.0, snap: 0.1 }
+        Self {
+            pairing: Pairing::Refined,
+            pair_angle: 140.0,
+            soft_corner_angle: 120.0,
+            max_corner_angle: 360.0,
+            snap: 0.1,
+        }
     }
 }
 
@@ -33,6 +55,7 @@ impl Parameters {
             }
         };
         check("soft_corner_angle", self.soft_corner_angle, 60.0, 180.0, "60 to 180 degrees")?;
+        check("pair_angle", self.pair_angle, 90.0, 180.0, "90 to 180 degrees")?;
         check("max_corner_angle", self.max_corner_angle, 90.0, 360.0, "90 to 360 degrees")?;
         check("snap", self.snap, 0.0, 0.45, "0 to 0.45")
     }

@@ -22,7 +22,7 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self { tiles: 0, tile_size: 2.4, lloyd_rounds: 2, follow_features: true, faces_per_tile: 24 }
+        Self { tiles: 0, tile_size: 4.0, lloyd_rounds: 2, follow_features: true, faces_per_tile: 24 }
     }
 }
 

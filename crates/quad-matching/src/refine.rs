@@ -1,0 +1,184 @@
+//! One midpoint refinement of macro-triangles and macro-quads into quads.
+//!
+//! Each region gets a vertex at its centre, joined to the middles of its sides: a triangle gives three quads, a quad
+//! four. Pairs of triangles that would make a bad quad can so be left apart, and no matching has to be perfect. The
+//! paths to the centre are cut as the spokes of a tile are, in a map of the region to a disk.
+
+use crate::sides::Tiled;
+use crate::spokes::{self, SpokeTask};
+use crate::{MacroEdge, QuadMatchingError, Side};
+use rayon::prelude::*;
+use std::collections::HashSet;
+use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
+use topipe_progress::Progress;
+
+/// A layout of regions with three or four sides, over the mesh of `tiled`, whose tiles are the regions.
+pub(crate) struct Regions {
+    pub(crate) tiled: Tiled,
+    pub(crate) vertices: Vec<VertexId>,
+    pub(crate) edges: Vec<MacroEdge>,
+    /// Sides of each region, counter-clockwise.
+    pub(crate) sides: Vec<Vec<Side>>,
+}
+
+/// A layout of quads.
+pub(crate) struct Quads {
+    pub(crate) tiled: Tiled,
+    pub(crate) vertices: Vec<VertexId>,
+    pub(crate) edges: Vec<MacroEdge>,
+    pub(crate) quads: Vec<[Side; 4]>,
+    pub(crate) quad_of_face: Vec<u32>,
+}
+
+/// Index in `path` of the middle by length; splits a mesh edge where no vertex is near.
+fn middle(tiled: &mut Tiled, path: &mut Vec<VertexId>, snap: f64) -> usize {
+    let at = |tiled: &Tiled, v: VertexId| tiled.refiner.part().mesh.position(v);
+    let mut along = vec![0.0];
+    for pair in path.windows(2) {
+        along.push(along[along.len() - 1] + at(tiled, pair[0]).distance(at(tiled, pair[1])));
+    }
+    let last = path.len() - 1;
+    let goal = along[last] / 2.0;
+    let k = along.partition_point(|&s| s <= goal).clamp(1, last) - 1;
+    let piece = along[k + 1] - along[k];
+    let t = if piece > 0.0 { (goal - along[k]) / piece } else { 0.5 };
+    if t < snap && k > 0 {
+        return k;
+    }
+    if t > 1.0 - snap && k + 1 < last {
+        return k + 1;
+    }
+    if let Some(h) = tiled.refiner.half_edge(path[k], path[k + 1]) {
+        let vertex = tiled.split_edge(h, t.clamp(0.1, 0.9));
+        path.insert(k + 1, vertex);
+    }
+    k + 1
+}
+
+/// Refines all regions.
+pub(crate) fn refine(regions: Regions, snap: f64, progress: &Progress) -> Result<Quads, QuadMatchingError> {
+    let Regions { mut tiled, mut vertices, edges, sides } = regions;
+    // Halves of the edges: 2 e from the first end to the middle, 2 e + 1 from there to the last end.
+    let mut fine = Vec::with_capacity(2 * edges.len());
+    let mut whole: Vec<Vec<VertexId>> = Vec::with_capacity(edges.len());
+    let mut middles = Vec::with_capacity(edges.len());
+    for edge in &edges {
+        let mut path = edge.path.clone();
+        let k = middle(&mut tiled, &mut path, snap);
+        let number = vertices.len() as u32;
+        vertices.push(path[k]);
+        middles.push(path[k]);
+        fine.push(MacroEdge {
+            ends: [edge.ends[0], number],
+            path: path[..=k].to_vec(),
+            feature: edge.feature,
+        });
+        fine.push(MacroEdge {
+            ends: [number, edge.ends[1]],
+            path: path[k..].to_vec(),
+            feature: edge.feature,
+        });
+        whole.push(path);
+    }
+    let middle_number = |edge: u32| fine_middle(&fine, edge);
+
+    let mut faces: Vec<Vec<FaceId>> = vec![Vec::new(); sides.len()];
+    for (f, &region) in tiled.tile_of_face.iter().enumerate() {
+        faces[region as usize].push(FaceId::new(f));
+    }
+    let tasks: Vec<SpokeTask> = sides
+        .iter()
+        .zip(faces)
+        .enumerate()
+        .map(|(region, (sides, faces))| {
+            let mut border = Vec::new();
+            for side in sides {
+                let mut path = whole[side.edge as usize].clone();
+                if side.reversed {
+                    path.reverse();
+                }
+                path.pop();
+                border.extend(path);
+            }
+            let targets = sides.iter().map(|side| (middles[side.edge as usize], None)).collect();
+            SpokeTask { tile: region as u32, border, targets, faces, anchor: None }
+        })
+        .collect();
+    let shared = &tiled;
+    let maps: Vec<_> = tasks.par_iter().map(|task| spokes::map(shared, task)).collect();
+    let mut spokes_of = Vec::with_capacity(tasks.len());
+    let mut spoke_edges = Vec::new();
+    for (task, map) in tasks.iter().zip(maps) {
+        if task.tile % 64 == 0 {
+            progress.check()?;
+            progress.step(task.tile.into(), tasks.len() as u64, "regions");
+        }
+        let (center, paths) = spokes::cut(&mut tiled, task, map, snap)?;
+        let number = vertices.len() as u32;
+        vertices.push(center);
+        spokes_of.push((fine.len() + spoke_edges.len()) as u32);
+        for (side, path) in sides[task.tile as usize].iter().zip(paths) {
+            let ends = [number, middle_number(side.edge)];
+            spoke_edges.push(MacroEdge { ends, path, feature: None });
+        }
+    }
+    fine.extend(spoke_edges);
+
+    let mut quads = Vec::new();
+    for (sides, &first) in sides.iter().zip(&spokes_of) {
+        let n = sides.len();
+        // The first and second half of a side in the direction of the region.
+        let half = |side: Side, second: bool| Side {
+            edge: 2 * side.edge + (side.reversed != second) as u32,
+            reversed: side.reversed,
+        };
+        for k in 0..n {
+            let before = (k + n - 1) % n;
+            quads.push([
+                half(sides[k], false),
+                Side { edge: first + k as u32, reversed: true },
+                Side { edge: first + before as u32, reversed: false },
+                half(sides[before], true),
+            ]);
+        }
+    }
+    let quad_of_face = flood(&tiled, &fine, &quads)?;
+    Ok(Quads { tiled, vertices, edges: fine, quads, quad_of_face })
+}
+
+fn fine_middle(fine: &[MacroEdge], edge: u32) -> u32 {
+    fine[2 * edge as usize].ends[1]
+}
+
+/// The quad of each face: what can be reached from a face beside its first side without crossing any side.
+fn flood(tiled: &Tiled, edges: &[MacroEdge], quads: &[[Side; 4]]) -> Result<Vec<u32>, QuadMatchingError> {
+    let key = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];
+    let blocked: HashSet<[VertexId; 2]> =
+        edges.iter().flat_map(|e| e.path.windows(2)).map(|w| key(w[0], w[1])).collect();
+    let mut quad_of_face = vec![u32::MAX; tiled.tile_of_face.len()];
+    for (q, quad) in quads.iter().enumerate() {
+        let path = &edges[quad[0].edge as usize].path;
+        let (a, b) =
+            if quad[0].reversed { (path[path.len() - 1], path[path.len() - 2]) } else { (path[0], path[1]) };
+        let Some(h) = tiled.refiner.half_edge(a, b) else {
+            return Err(QuadMatchingError::Tiling("a macro-edge leaves the mesh".into()));
+        };
+        quad_of_face[h.face().index()] = q as u32;
+        let mut stack = vec![h.face()];
+        while let Some(face) = stack.pop() {
+            for k in 0..3 {
+                let h = HalfEdgeId::of(face, k);
+                let next = tiled.refiner.twin(h).face();
+                let across = key(tiled.refiner.origin(h), tiled.refiner.target(h));
+                if quad_of_face[next.index()] == u32::MAX && !blocked.contains(&across) {
+                    quad_of_face[next.index()] = q as u32;
+                    stack.push(next);
+                }
+            }
+        }
+    }
+    match quad_of_face.iter().position(|&q| q == u32::MAX) {
+        Some(face) => Err(QuadMatchingError::Tiling(format!("face {face} lies in no quad"))),
+        None => Ok(quad_of_face),
+    }
+}
