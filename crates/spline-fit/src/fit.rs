@@ -177,7 +177,9 @@ fn solve(
             if edge.feature.is_some() {
                 let points: Vec<DVec3> = edge.path.iter().map(|&v| mesh.position(v)).collect();
                 let ends = edge.ends.map(|v| known[v as usize].unwrap_or(points[0]));
-                return fit_curve(basis, &gram, &points, ends, parameters.lambda)
+                // A feature is free of noise: bend as little against it as keeps the equations regular.
+                let lambda = 1.0 - (1.0 - parameters.lambda) * 1e-4;
+                return fit_curve(basis, &gram, &points, ends, lambda)
                     .ok_or_else(|| singular("edge", e, points[0]));
             }
             let found = solve_group(&beside[e], &unknowns, &energies, &known);
