@@ -4,6 +4,7 @@ use crate::matching::{DOUBLET_PENALTY, Diagonal, perfect_matching, widest_corner
 use crate::refine::{Quads, Regions, refine};
 use crate::sides::{FeaturePath, TileSide, Tiled, feature_paths, midpoints, tile_sides};
 use crate::spokes::{self, SpokeTask};
+use crate::straighten::straighten;
 use crate::{MacroEdge, Pairing, Parameters, QuadLayout, QuadMatchingError, Side};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};
@@ -92,20 +93,21 @@ pub fn match_quads(
     let region_of_face: Vec<u32> = triangle_of_face.iter().map(|&t| region_of_triangle[t as usize]).collect();
 
     let macro_triangles = triangles.len() as u32;
+    let (edges, sides) = without_removed(edges, regions, &partner);
+    tiled.tile_of_face = region_of_face;
+    let mut regions = Regions { tiled, vertices: sites, edges, sides };
+    for _ in 0..parameters.straightening_rounds {
+        straighten(&mut regions, parameters.snap, progress)?;
+    }
     let quads = match parameters.pairing {
         Pairing::Perfect => Quads {
-            quads: regions.iter().filter_map(|sides| sides[..].try_into().ok()).collect(),
-            vertices: sites,
-            edges,
-            quad_of_face: region_of_face,
-            tiled,
+            quads: regions.sides.iter().filter_map(|sides| sides[..].try_into().ok()).collect(),
+            vertices: regions.vertices,
+            edges: regions.edges,
+            quad_of_face: regions.tiled.tile_of_face.clone(),
+            tiled: regions.tiled,
         },
-        Pairing::Refined => {
-            let (edges, sides) = without_removed(edges, regions, &partner);
-            tiled.tile_of_face = region_of_face;
-            let regions = Regions { tiled, vertices: sites, edges, sides };
-            refine(regions, parameters.snap, progress)?
-        }
+        Pairing::Refined => refine(regions, parameters.snap, progress)?,
     };
     let (part, _): (Part, Vec<FaceId>) = quads.tiled.refiner.finish();
     let mut layout = QuadLayout {

@@ -21,6 +21,7 @@ mod parameters;
 mod refine;
 mod sides;
 mod spokes;
+mod straighten;
 mod verify;
 
 pub use dual::match_quads;

@@ -232,7 +232,8 @@ impl Cutter {
         let most = 10 * tiled.tile_of_face.len();
         for _ in 0..most {
             let fan = tiled.refiner.outgoing(current);
-            if fan.iter().any(|&h| tiled.refiner.target(h) == target) {
+            let inside = |h: HalfEdgeId| tiled.tile(h) == self.tile && !tiled.is_border(h);
+            if fan.iter().any(|&h| tiled.refiner.target(h) == target && inside(h)) {
                 path.push(target);
                 return Some(path);
             }
