@@ -1,6 +1,6 @@
 //! The quadrilateral layout: macro-vertices, macro-edges and macro-quads over a refined mesh.
 
-use crate::dual::face_angle;
+use crate::pairing::face_angle;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use topipe_mesh::{FeatureKind, HalfEdgeId, Part, VertexId};

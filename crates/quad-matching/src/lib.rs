@@ -17,6 +17,7 @@ mod dual;
 mod error;
 mod layout;
 mod matching;
+mod pairing;
 mod parameters;
 mod refine;
 mod sides;

@@ -3,7 +3,7 @@
 use topipe_mesh::Part;
 use topipe_mesh::import::{ImportOptions, read};
 use topipe_progress::Progress;
-use topipe_quad_matching::{Parameters, QuadLayout, QuadMatchingError, match_quads, verify};
+use topipe_quad_matching::{Pairing, Parameters, QuadLayout, QuadMatchingError, match_quads, verify};
 use topipe_tiling::{Tiling, tile};
 
 fn fixture(name: &str) -> Part {
@@ -48,6 +48,21 @@ fn layouts_of_all_reference_parts_hold_what_they_promise() {
         assert!((after.volume() / before.volume() - 1.0).abs() < 1e-11, "{name}");
         assert!((after.area() / before.area() - 1.0).abs() < 1e-11, "{name}");
         assert_eq!(after.positions[..before.vertex_count()], before.positions[..]);
+    }
+}
+
+#[test]
+fn pairing_all_triangles_gives_a_quarter_of_the_quads() {
+    for (name, genus) in [("monster-lite", 1), ("support", 5)] {
+        let tiling = tiling(name);
+        let parameters = Parameters { pairing: Pairing::Perfect, ..Default::default() };
+        let layout = match_quads(&tiling, &parameters, &Progress::silent()).unwrap();
+        assert_eq!(verify(&layout), Vec::<String>::new(), "{name}");
+        // N - 2 + 2 g, less one for each doublet that was merged.
+        let quads = tiling.tile_count() - 2 + 2 * genus;
+        let merged = tiling.tile_count() - layout.vertices.len();
+        assert_eq!(layout.quads.len(), quads - merged, "{name}");
+        assert!(merged * 10 < quads, "{name}: {merged} doublets");
     }
 }
 

@@ -27,9 +27,12 @@
 mod border;
 mod corners;
 mod curves;
+mod densify;
 mod error;
 mod growth;
 mod parameters;
+mod repair;
+mod seeding;
 mod tessellate;
 mod tiling;
 mod verify;
