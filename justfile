@@ -29,3 +29,23 @@ threads case="bracket":
         (cd target/threads/$n/cache && find artifacts-v1 -type f | sort) > target/threads/$n.txt; \
     done
     cmp target/threads/1.txt target/threads/2.txt && cmp target/threads/1.txt target/threads/8.txt
+
+# Draw the pictures of the README and of pipelines/README.md anew.
+pictures: all
+    for stage in mesh smooth quads surface; do \
+        target/release/topipe -q render $stage --pipeline pipelines/bracket.toml \
+            -o pipelines/pictures/bracket-$stage.png --size 900x680 || exit 1; \
+    done
+    for case in beam-two-holes bridge bell-crank support cantilever cantilever-four y-form monster-lite; do \
+        target/release/topipe -q render surface --pipeline pipelines/$case.toml \
+            -o pipelines/pictures/$case.png --size 720x540 || exit 1; \
+    done
+    target/release/topipe -q render frame --pipeline pipelines/cantilever.toml \
+        -o pipelines/pictures/cantilever-skeleton.png --size 720x540
+
+# Open all nine STEP files in OpenCASCADE and gmsh, at four mesh sizes. Needs the packages of tests/clients.
+clients python="target/clients/bin/python": all
+    for case in bracket beam-two-holes bridge bell-crank support cantilever cantilever-four y-form monster-lite; do \
+        {{python}} tests/clients/check_step.py topipe-out/$case/$case.step \
+            --reference topipe-out/$case/$case-smooth.stl --gmsh 16,8,4,2 || exit 1; \
+    done
