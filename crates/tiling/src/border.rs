@@ -22,7 +22,7 @@ pub(crate) enum Shape {
     Disk(Vec<Run>),
 }
 
-/// V - E + F of an edge-connected set of faces; 1 exactly for a disk.
+/// V - E + F of a set of faces; for an edge-connected one it is 1 exactly for a disk.
 fn euler(refiner: &Refiner, growth: &Growth, tile: u32, faces: &[FaceId]) -> i64 {
     let mut vertices = HashSet::with_capacity(faces.len());
     let mut inner = 0i64;
@@ -51,6 +51,8 @@ pub(crate) fn shape(refiner: &Refiner, growth: &Growth, faces: &[FaceId]) -> Sha
         .flat_map(|&f| (0..3).map(move |k| HalfEdgeId::of(f, k)))
         .filter(|&h| refiner.twin(h).is_some() && across(h) != tile);
     let Some(start) = border.next() else { return Shape::NotDisk };
+    // A disk and a ring together also have characteristic 1, but more than one border.
+    let mut left = border.count();
     let mut runs: Vec<Run> = Vec::new();
     let mut h = start;
     loop {
@@ -65,6 +67,10 @@ pub(crate) fn shape(refiner: &Refiner, growth: &Growth, faces: &[FaceId]) -> Sha
         if h == start {
             break;
         }
+        left = left.saturating_sub(1);
+    }
+    if left > 0 {
+        return Shape::NotDisk;
     }
     if runs.len() > 1
         && runs[0].neighbor == runs[runs.len() - 1].neighbor

@@ -9,6 +9,9 @@ use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
 /// Rounds after which the construction gives up. The nine reference parts need at most 12.
 const MOST_ROUNDS: usize = 200;
 
+/// Rounds after which feature curves give way to the conditions where both can not be had.
+const PATIENCE: usize = 30;
+
 impl Tessellation<'_> {
     /// Places where a site would break a violation of (a) or (c), at most one per neighbourhood, and the tiles
     /// that are in the way of each.
@@ -128,12 +131,42 @@ impl Tessellation<'_> {
         }
     }
 
+    /// Takes the faces along its curves away from each violating tile that they tear apart: where curves run close to
+    /// each other, the stretch of one may cut off the stretch of another from its site, and no further site heals
+    /// that. With `all`, from every violating tile. True when there was one; tiles are grown anew then.
+    fn release(&mut self, violations: &[(VertexId, Vec<u32>)], all: bool) -> bool {
+        let by_tile = self.faces_by_tile();
+        let mut released = false;
+        for &tile in violations.iter().flat_map(|(_, tiles)| tiles) {
+            let site = tile as usize;
+            if self.sites[site].along.is_empty() {
+                continue;
+            }
+            let whole = self
+                .star(self.sites[site].vertex)
+                .into_iter()
+                .find(|f| self.growth.owner[f.index()] == tile)
+                .is_some_and(|f| self.growth.flood(&self.refiner, f).len() == by_tile[site].len());
+            if all || !whole {
+                self.sites[site].along.clear();
+                released = true;
+            }
+        }
+        if released {
+            self.regrow();
+        }
+        released
+    }
+
     /// Rounds of repair until no violation is left.
     pub(crate) fn repair(&mut self) -> Result<(), TilingError> {
         let mut left = Vec::new();
         for round in 0..MOST_ROUNDS {
             self.progress.check()?;
             let violations = self.violations();
+            if self.release(&violations, round >= PATIENCE) {
+                continue;
+            }
             if !violations.is_empty() {
                 self.progress.remark(&format!("round {round}: {} tiles to split", violations.len()));
                 left = violations.iter().map(|v| v.0).collect();
