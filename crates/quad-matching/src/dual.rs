@@ -128,8 +128,11 @@ pub fn match_quads(
 
 /// The gate on corner angles.
 fn check_corners(layout: &QuadLayout, parameters: &Parameters) -> Result<(), QuadMatchingError> {
-    let angles = layout.corner_angles();
     let limit = parameters.max_corner_angle;
+    if limit == 0.0 {
+        return Ok(());
+    }
+    let angles = layout.corner_angles();
     let widest = |corners: &[f64; 4]| corners.iter().fold(0.0f64, |a, &b| a.max(b)).to_degrees();
     let above = angles.iter().filter(|corners| widest(corners) > limit).count();
     if above > 0 {

@@ -28,7 +28,8 @@ pub struct Parameters {
     pub straightening_rounds: u32,
     /// Corners wider than this, in degrees, begin to cost in the matching: exp((angle - soft) / 5).
     pub soft_corner_angle: f64,
-    /// The layout is refused when a corner is wider than this, in degrees (a patch folds at 180); 360 = never.
+    /// The layout is refused when a corner is wider than this, in degrees (a patch folds at 180); 0 = never, wide
+    /// corners are only reported.
     pub max_corner_angle: f64,
     /// Points nearer to a vertex than this fraction of an edge are moved onto it when macro-edges are cut.
     pub snap: f64,
@@ -46,7 +47,7 @@ impl Default for Parameters {
             pair_angle: 140.0,
             straightening_rounds: STRAIGHTENING_ROUNDS,
             soft_corner_angle: 120.0,
-            max_corner_angle: 360.0,
+            max_corner_angle: 0.0,
             snap: 0.1,
         }
     }
@@ -66,7 +67,9 @@ impl Parameters {
         let rounds = f64::from(self.straightening_rounds);
         check("straightening_rounds", rounds, 0.0, 10.0, "0 to 10")?;
         check("pair_angle", self.pair_angle, 90.0, 180.0, "90 to 180 degrees")?;
-        check("max_corner_angle", self.max_corner_angle, 90.0, 360.0, "90 to 360 degrees")?;
+        if self.max_corner_angle != 0.0 {
+            check("max_corner_angle", self.max_corner_angle, 90.0, 360.0, "0, or 90 to 360 degrees")?;
+        }
         check("snap", self.snap, 0.0, 0.45, "0 to 0.45")
     }
 }

@@ -119,14 +119,7 @@ pub(crate) fn cut(
     map: Option<DiskMap>,
     snap: f64,
 ) -> Result<(VertexId, Vec<Vec<VertexId>>), QuadMatchingError> {
-    let mut cutter = Cutter {
-        map: map.unwrap_or(DiskMap { places: HashMap::new() }),
-        border: task.border.iter().copied().collect(),
-        on_spoke: HashSet::new(),
-        spoke_edges: BTreeSet::new(),
-        tile: task.tile,
-        snap,
-    };
+    let mut cutter = Cutter::new(task, map.unwrap_or(DiskMap { places: HashMap::new() }), snap);
     let site = match task.anchor {
         Some(vertex) => vertex,
         None => cutter.center(tiled, &task.faces),
@@ -154,7 +147,32 @@ pub(crate) fn cut(
     Ok((site, paths))
 }
 
+/// Cuts a straight path between two border vertices of a region. Where that fails the old path is returned, which
+/// has more vertices now if edges of it were cut on the way.
+pub(crate) fn recut(
+    tiled: &mut Tiled,
+    task: &SpokeTask,
+    map: DiskMap,
+    old: &[VertexId],
+    snap: f64,
+) -> Vec<VertexId> {
+    let mut cutter = Cutter::new(task, map, snap);
+    let (from, to) = (old[0], old[old.len() - 1]);
+    if let Some(path) = cutter.straight(tiled, from, to) {
+        return path;
+    }
+    let mut path = old.to_vec();
+    for (edge, vertex) in cutter.cuts {
+        if let Some(k) = path.windows(2).position(|w| key(w[0], w[1]) == edge) {
+            path.insert(k + 1, vertex);
+        }
+    }
+    path
+}
+
 struct Cutter {
+    /// Edges that were cut, in order, and the vertices that cut them.
+    cuts: Vec<([VertexId; 2], VertexId)>,
     map: DiskMap,
     border: HashSet<VertexId>,
     on_spoke: HashSet<VertexId>,
@@ -168,6 +186,18 @@ fn key(a: VertexId, b: VertexId) -> [VertexId; 2] {
 }
 
 impl Cutter {
+    fn new(task: &SpokeTask, map: DiskMap, snap: f64) -> Self {
+        Self {
+            cuts: Vec::new(),
+            map,
+            border: task.border.iter().copied().collect(),
+            on_spoke: HashSet::new(),
+            spoke_edges: BTreeSet::new(),
+            tile: task.tile,
+            snap,
+        }
+    }
+
     fn block(&mut self, path: &[VertexId]) {
         self.on_spoke.extend(path);
         self.spoke_edges.extend(path.windows(2).map(|w| key(w[0], w[1])));
@@ -265,6 +295,7 @@ impl Cutter {
                 let place = self.map.at(a).lerp(self.map.at(b), t);
                 let vertex = tiled.split_edge(across, t);
                 self.map.places.insert(vertex, place);
+                self.cuts.push((key(a, b), vertex));
                 vertex
             };
             if path.contains(&vertex) {
@@ -276,21 +307,22 @@ impl Cutter {
         None
     }
 
-    /// The shortest path along mesh edges inside the tile that meets no other spoke; refines until there is one.
+    /// The shortest path along mesh edges inside the tile that meets no other spoke. Where none is free, the edges
+    /// that bar the way are split: those inside with both ends on the border or on spokes.
     fn detour(&mut self, tiled: &mut Tiled, site: VertexId, target: VertexId) -> Option<Vec<VertexId>> {
         for _ in 0..4 {
             if let Some(path) = self.search(tiled, site, target) {
                 return Some(path);
             }
-            // Split every inner edge of the tile: afterwards each face has room beside its spokes.
-            let edges: Vec<[VertexId; 2]> = (0..tiled.tile_of_face.len() * 3)
+            let taken = |v: VertexId| self.border.contains(&v) || self.on_spoke.contains(&v);
+            let bars: Vec<[VertexId; 2]> = (0..tiled.tile_of_face.len() * 3)
                 .map(HalfEdgeId::new)
                 .filter(|&h| tiled.tile(h) == self.tile && tiled.refiner.twin(h).0 > h.0)
                 .filter(|&h| !tiled.is_border(h))
                 .map(|h| key(tiled.refiner.origin(h), tiled.refiner.target(h)))
-                .filter(|edge| !self.spoke_edges.contains(edge))
+                .filter(|edge| !self.spoke_edges.contains(edge) && edge.iter().all(|&v| taken(v)))
                 .collect();
-            for [a, b] in edges {
+            for [a, b] in bars {
                 if let Some(h) = tiled.refiner.half_edge(a, b) {
                     let place = self.map.at(a).lerp(self.map.at(b), 0.5);
                     let vertex = tiled.split_edge(h, 0.5);

@@ -113,9 +113,8 @@ fn straighten_one(
         return Ok(());
     }
     faces.iter().for_each(|f| tiled.tile_of_face[f.index()] = id);
-    let task = SpokeTask { tile: id, border, targets: vec![(b, None)], faces, anchor: Some(a) };
-    let (_, mut paths) = spokes::cut(tiled, &task, Some(map), snap)?;
-    let path = paths.swap_remove(0);
+    let task = SpokeTask { tile: id, border, targets: Vec::new(), faces, anchor: None };
+    let path = spokes::recut(tiled, &task, map, &path, snap);
 
     // What lies to the right of the new path belongs to the other region again.
     let key = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];

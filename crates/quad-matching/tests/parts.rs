@@ -52,6 +52,22 @@ fn layouts_of_all_reference_parts_hold_what_they_promise() {
 }
 
 #[test]
+fn tiles_of_any_size_give_a_layout() {
+    for name in ["y-form", "monster-lite", "cantilever"] {
+        let part = fixture(name);
+        for tile_size in [2.0, 6.0, 12.0, 40.0] {
+            let parameters = topipe_tiling::Parameters { tile_size, ..Default::default() };
+            let tiling = tile(&part, &parameters, &Progress::silent()).unwrap();
+            assert_eq!(topipe_tiling::verify(&tiling), [], "{name}, tile_size {tile_size}");
+            let layout = layout(&tiling);
+            assert_eq!(verify(&layout), Vec::<String>::new(), "{name}, tile_size {tile_size}");
+            // Cutting macro-edges refines along them only.
+            assert!(layout.part.mesh.face_count() < 8 * tiling.part.mesh.face_count());
+        }
+    }
+}
+
+#[test]
 fn pairing_all_triangles_gives_a_quarter_of_the_quads() {
     for (name, genus) in [("monster-lite", 1), ("support", 5)] {
         let tiling = tiling(name);

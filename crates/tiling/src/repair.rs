@@ -210,7 +210,8 @@ impl Tessellation<'_> {
                 protected[face.index()] = true;
             }
         }
-        let site_face: Vec<FaceId> = self.sites.iter().map(|s| self.star(s.vertex)[0]).collect();
+        let site_face: Vec<FaceId> =
+            self.representatives().into_iter().map(|face| face.unwrap_or(FaceId(0))).collect();
         let vertices: Vec<VertexId> = self.refiner.part().mesh.vertices().collect();
         let mut left = Vec::new();
         for vertex in vertices {

@@ -122,30 +122,39 @@ impl Tessellation<'_> {
         faces
     }
 
+    /// A face of each tile to stand for it: one around its site where the tile has any of these, else its nearest.
+    /// None for a tile whose faces all went to others.
+    pub(crate) fn representatives(&self) -> Vec<Option<FaceId>> {
+        let mut nearest: Vec<Option<FaceId>> = vec![None; self.sites.len()];
+        for (f, &owner) in self.growth.owner.iter().enumerate().filter(|(_, o)| **o != NONE) {
+            let slot = &mut nearest[owner as usize];
+            if slot.is_none_or(|g| self.growth.distance[f] < self.growth.distance[g.index()]) {
+                *slot = Some(FaceId::new(f));
+            }
+        }
+        self.sites
+            .iter()
+            .enumerate()
+            .map(|(tile, site)| {
+                let own = |f: &FaceId| self.growth.owner[f.index()] == tile as u32;
+                self.star(site.vertex).into_iter().find(own).or(nearest[tile])
+            })
+            .collect()
+    }
+
     fn finish(self) -> Tiling {
-        let sites = self
-            .sites
-            .iter()
-            .enumerate()
-            .map(|(tile, site)| {
-                let star = self.refiner.outgoing(site.vertex);
-                star.iter()
-                    .map(|h| h.face())
-                    .find(|f| self.growth.owner[f.index()] == tile as u32)
-                    .unwrap_or(star[0].face())
-            })
-            .collect();
-        let anchors = self
-            .sites
-            .iter()
-            .enumerate()
-            .map(|(tile, site)| {
-                let star = self.refiner.outgoing(site.vertex);
-                let whole = star.iter().all(|h| self.growth.owner[h.face().index()] == tile as u32);
-                (site.anchor && whole).then_some(site.vertex)
-            })
-            .collect();
+        let mut number = vec![TileId::NONE; self.sites.len()];
+        let (mut sites, mut anchors) = (Vec::new(), Vec::new());
+        for (tile, face) in self.representatives().into_iter().enumerate() {
+            let Some(face) = face else { continue };
+            number[tile] = TileId(sites.len() as u32);
+            let site = &self.sites[tile];
+            let whole = self.star(site.vertex).iter().all(|f| self.growth.owner[f.index()] == tile as u32);
+            sites.push(face);
+            anchors.push((site.anchor && whole).then_some(site.vertex));
+        }
+        let tile_of_face = self.growth.owner.iter().map(|&owner| number[owner as usize]).collect();
         let (part, _) = self.refiner.finish();
-        Tiling { part, tile_of_face: self.growth.owner.into_iter().map(TileId).collect(), sites, anchors }
+        Tiling { part, tile_of_face, sites, anchors }
     }
 }
