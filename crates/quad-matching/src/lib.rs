@@ -3,14 +3,15 @@
 //! Source: Beccari, Ceruti, Chudy 2025, *From Topological Optimization to Spline Layouts*, section 2.2; Eck et al.
 //! 1995; Eck and Hoppe 1996. The sites of neighbouring tiles are joined by macro-edges through the middles of the
 //! common borders; three tiles around a corner give a macro-triangle; macro-triangles are paired by a minimum-weight
-//! perfect matching into macro-quads.
+//! matching. By default only good pairs are made and everything is refined once; the source's perfect matching into
+//! macro-quads is [`Pairing::Perfect`].
 //!
 //! Guarantees: see [`QuadLayout`], checked independently by [`verify`]. On a closed surface the number of
 //! macro-triangles is even and their dual graph is cubic and bridgeless, so a perfect matching exists (Petersen).
 //! The refinement moves no point of the surface.
 //!
 //! Not guaranteed: that corners are narrower than 180 degrees; they are penalized in the matching, reported by
-//! validation, and refused above `max_corner_angle`.
+//! validation, and refused above `max_corner_angle` where that is set.
 
 mod doublets;
 mod dual;

@@ -86,8 +86,8 @@ pub(crate) fn match_good_pairs(
     partner
 }
 
-/// Rounds in which edges whose removal makes a doublet are penalized; the nine reference parts have none left after
-/// at most eight.
+/// Rounds in which edges whose removal makes a doublet are penalized. Each is a whole matching (about 0.2 s at 1,800
+/// triangles on a busy machine), and twelve did not clear all doublets either; those that remain are merged.
 const DOUBLET_ROUNDS: usize = 3;
 
 /// Matches, and matches again with the edges penalized that were removed at sites left with two quads. Doublets

@@ -6,7 +6,8 @@ use crate::corners::{Protected, relieve};
 use crate::tessellate::Tessellation;
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
 
-/// Rounds after which the construction gives up. The nine reference parts need at most 12.
+/// Rounds after which the construction gives up. The nine reference parts need at most 24
+/// (bridge), a gripper of genus 15 needed 41.
 const MOST_ROUNDS: usize = 200;
 
 /// Rounds after which feature curves give way to the conditions where both can not be had.
