@@ -117,6 +117,7 @@ pub fn match_quads(
         edges: quads.edges,
         quads: quads.quads,
         quad_of_face: quads.quad_of_face,
+        region_faces: Vec::new(),
         tiles: tiles as u32,
         macro_triangles,
     };

@@ -3,7 +3,7 @@
 use crate::pairing::face_angle;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use topipe_mesh::{FeatureKind, HalfEdgeId, Part, VertexId};
+use topipe_mesh::{FeatureKind, HalfEdgeId, Part, RegionId, VertexId};
 
 /// A side of a macro-quad: a macro-edge and the direction in which the quad runs along it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,10 +25,22 @@ pub struct MacroEdge {
     pub feature: Option<FeatureKind>,
 }
 
-/// A partition of a part's mesh into quadrilaterals.
+/// A region of known shape that is one face of the layout and has no quads.
 ///
-/// Guarantees: each macro-edge is a path of mesh edges and is used by exactly two sides, in opposite directions;
-/// the faces of each quad form a disk bounded by its four sides; V - E + F of the layout equals that of the mesh.
+/// Its loops run with the material of the face on their left, seen from outside: the outer border of a plane
+/// counter-clockwise, its holes clockwise.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RegionFace {
+    /// Which region of the part.
+    pub region: RegionId,
+    /// Its borders, each a closed chain of sides. None where the region is a closed surface of its own.
+    pub loops: Vec<Vec<Side>>,
+}
+
+/// A partition of a part's mesh into quadrilaterals and faces of known shape.
+///
+/// Guarantees: each macro-edge is a path of mesh edges and is used by exactly two sides, of quads or of loops of
+/// region faces, in opposite directions; the faces of each quad form a disk bounded by its four sides.
 /// Not guaranteed: that two quads share at most one side (they are addressed by sides, so that is harmless).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct QuadLayout {
@@ -40,8 +52,10 @@ pub struct QuadLayout {
     pub edges: Vec<MacroEdge>,
     /// The four sides of each quad, counter-clockwise seen from outside.
     pub quads: Vec<[Side; 4]>,
-    /// The quad of each mesh face.
+    /// The quad of each mesh face; [`QuadLayout::NO_QUAD`] inside a region face.
     pub quad_of_face: Vec<u32>,
+    /// The regions that are faces of their own.
+    pub region_faces: Vec<RegionFace>,
     /// Number of tiles of the tessellation this layout is the dual of.
     pub tiles: u32,
     /// Number of macro-triangles that were matched.
@@ -49,6 +63,9 @@ pub struct QuadLayout {
 }
 
 impl QuadLayout {
+    /// Stands in [`Self::quad_of_face`] for faces that lie in a region face.
+    pub const NO_QUAD: u32 = u32::MAX;
+
     /// The macro-vertex a side starts from.
     #[inline]
     pub fn start(&self, side: Side) -> u32 {

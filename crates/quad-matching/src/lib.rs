@@ -28,6 +28,6 @@ mod verify;
 
 pub use dual::match_quads;
 pub use error::QuadMatchingError;
-pub use layout::{MacroEdge, QuadLayout, Side};
+pub use layout::{MacroEdge, QuadLayout, RegionFace, Side};
 pub use parameters::{Pairing, Parameters};
 pub use verify::verify;

@@ -12,7 +12,7 @@ use crate::cholesky::Symmetric;
 use crate::energy::{Energy, Gram, energy};
 use crate::samples::{PatchSamples, arc_length, faces_by_quad, sample};
 use crate::unknowns::Unknowns;
-use crate::{Basis, EdgeCurve, Parameters, Patch, PatchSide, SplineFitError, SplineSurface};
+use crate::{Basis, CurveShape, EdgeCurve, Parameters, Patch, PatchSide, SplineFitError, SplineSurface};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use topipe_mesh::DVec3;
@@ -221,6 +221,7 @@ fn solve(
                 basis: basis.clone(),
                 control: (0..n).map(|m| control[unknowns.edge(e, m)]).collect(),
                 feature: edge.feature,
+                shape: CurveShape::Spline,
             })
             .collect(),
         patches: (0..layout.quads.len())
@@ -231,6 +232,7 @@ fn solve(
                 control: unknowns.of_patch(quad).into_iter().map(|number| control[number]).collect(),
             })
             .collect(),
+        faces: Vec::new(),
     })
 }
 

@@ -29,4 +29,4 @@ pub use error::SplineFitError;
 pub use fit::fit;
 pub use parameters::Parameters;
 pub use shells::{Shell, shells};
-pub use surface::{EdgeCurve, Patch, PatchSide, SplineSurface, SurfacePoint};
+pub use surface::{AnalyticFace, CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface, SurfacePoint};

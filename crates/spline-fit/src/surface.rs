@@ -2,7 +2,7 @@
 
 use crate::basis::Basis;
 use serde::{Deserialize, Serialize};
-use topipe_mesh::{DVec3, FeatureKind};
+use topipe_mesh::{DVec3, FeatureKind, RegionShape};
 
 /// A side of a patch: an edge curve and the direction in which the patch runs along it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -11,6 +11,25 @@ pub struct PatchSide {
     pub edge: u32,
     /// True when the patch runs from the curve's end to its start.
     pub reversed: bool,
+}
+
+/// What a curve is beside a B-spline.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub enum CurveShape {
+    /// Nothing else.
+    #[default]
+    Spline,
+    /// The straight line between its ends.
+    Line,
+    /// An arc of a circle from the first end to the last, counter-clockwise about the axis and shorter than a turn.
+    Arc {
+        /// Centre of the circle, mm.
+        center: DVec3,
+        /// Unit normal of its plane.
+        axis: DVec3,
+        /// Radius, mm.
+        radius: f64,
+    },
 }
 
 /// A B-spline curve between two vertices.
@@ -24,6 +43,18 @@ pub struct EdgeCurve {
     pub control: Vec<DVec3>,
     /// Set when the curve follows a feature of the mesh.
     pub feature: Option<FeatureKind>,
+    /// The exact shape where it is a simple one; the B-spline then agrees with it to within 1e-7 mm or 1e-9 of its
+    /// length, whichever is more.
+    pub shape: CurveShape,
+}
+
+/// A face of known shape, trimmed by edge curves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AnalyticFace {
+    /// Plane or cylinder, with the outward normal or the side on which the material lies.
+    pub shape: RegionShape,
+    /// Its borders; the face lies on their left seen from outside.
+    pub loops: Vec<Vec<PatchSide>>,
 }
 
 /// A tensor-product B-spline patch over [0, 1]^2.
@@ -36,13 +67,13 @@ pub struct Patch {
     pub basis_u: Basis,
     /// Degree and knots in v.
     pub basis_v: Basis,
-    /// Control points, u fastest: point (i, j) at `i + j * basis_u.len()`. The border rows equal those of the edge
-    /// curves bit for bit.
+    /// Control points, u fastest: point (i, j) at `i + j * basis_u.len()`. Each border row is the edge curve there:
+    /// the same control points bit for bit where the knots are the same, else the curve with knots inserted.
     pub control: Vec<DVec3>,
 }
 
-/// A closed surface of patches. Each edge curve is shared by exactly two patches that run along it in opposite
-/// directions, and S_u x S_v points out of the material.
+/// A closed surface of patches and analytic faces. Each edge curve is shared by exactly two of them that run along it
+/// in opposite directions, and S_u x S_v points out of the material.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SplineSurface {
     /// Corner points, mm.
@@ -51,6 +82,8 @@ pub struct SplineSurface {
     pub edges: Vec<EdgeCurve>,
     /// Patches.
     pub patches: Vec<Patch>,
+    /// Faces that are exactly plane or cylindrical.
+    pub faces: Vec<AnalyticFace>,
 }
 
 /// Position and first derivatives of a patch at a parameter.

@@ -23,9 +23,9 @@ kinds! {
     /// A partition of a mesh into disks.
     Tiling = "tiling" v 1: topipe_tiling::Tiling;
     /// A partition of a mesh into quadrilaterals.
-    QuadLayout = "quad layout" v 1: topipe_quad_matching::QuadLayout;
+    QuadLayout = "quad layout" v 2: topipe_quad_matching::QuadLayout;
     /// A closed surface of B-spline patches.
-    SplineSurface = "spline surface" v 1: topipe_spline_fit::SplineSurface;
+    SplineSurface = "spline surface" v 2: topipe_spline_fit::SplineSurface;
     /// A curve skeleton.
     Skeleton = "skeleton" v 1: topipe_skeleton::Skeleton;
     /// The figures of a validation.

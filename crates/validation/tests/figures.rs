@@ -93,7 +93,13 @@ fn spline_cube(degree: usize, spans: usize) -> SplineSurface {
             let edge = found.unwrap_or_else(|| {
                 let line = |t: f64| cube_corner(ends[0]).lerp(cube_corner(ends[1]), t);
                 let control = greville.iter().map(|&t| line(t)).collect();
-                edges.push(EdgeCurve { ends, basis: basis.clone(), control, feature: None });
+                edges.push(EdgeCurve {
+                    ends,
+                    basis: basis.clone(),
+                    control,
+                    feature: None,
+                    shape: Default::default(),
+                });
                 edges.len() - 1
             });
             PatchSide { edge: edge as u32, reversed: edges[edge].ends != ends }
@@ -114,7 +120,7 @@ fn spline_cube(degree: usize, spans: usize) -> SplineSurface {
         }
         patches.push(Patch { sides, basis_u: basis.clone(), basis_v: basis.clone(), control });
     }
-    SplineSurface { vertices: (0..8).map(cube_corner).collect(), edges, patches }
+    SplineSurface { vertices: (0..8).map(cube_corner).collect(), edges, patches, faces: Vec::new() }
 }
 
 #[test]
@@ -346,6 +352,7 @@ fn cube_layout(size: f64) -> QuadLayout {
         edges,
         quads: quads.to_vec(),
         quad_of_face: (0..12).map(|f| f / 2).collect(),
+        region_faces: Vec::new(),
         tiles: 8,
         macro_triangles: 12,
     }

@@ -141,7 +141,12 @@ mod tests {
             .collect();
         let sides = [PatchSide { edge: 0, reversed: false }; 4];
         let patch = Patch { sides, basis_u: basis.clone(), basis_v: basis, control };
-        let surface = SplineSurface { vertices: Vec::new(), edges: Vec::new(), patches: vec![patch] };
+        let surface = SplineSurface {
+            vertices: Vec::new(),
+            edges: Vec::new(),
+            patches: vec![patch],
+            faces: Vec::new(),
+        };
         let sampled = sample(&surface, 0.5);
         let mut chords = 0.0f64;
         for k in 0..50 {
