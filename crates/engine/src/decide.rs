@@ -3,11 +3,11 @@
 use crate::cache::{Bucket, Cache, CacheError, Damage, KeyRecord};
 use crate::hash::ContentHash;
 use crate::history::{History, StageHistory};
-use crate::input_file;
+use crate::input_file::{self, InputFileError};
 use crate::reason::{self, Reason};
 use crate::selection::Selection;
 use crate::spec::Pipeline;
-use crate::stage::KeyParts;
+use crate::stage::{KeyParts, SourceFile};
 use crate::{EngineError, StageNode};
 use std::collections::BTreeMap;
 
@@ -119,6 +119,19 @@ impl<'a> Decider<'a> {
     /// The external files of a stage.
     pub(crate) fn files(&self, stage: usize) -> &FileHashes {
         &self.files[stage]
+    }
+
+    /// The content of the files of a stage.
+    pub(crate) fn read_files(&self, stage: usize) -> Result<BTreeMap<String, SourceFile>, InputFileError> {
+        let node = &self.pipeline.stages[stage];
+        let mut files = BTreeMap::new();
+        for (field, (_, hash)) in &self.files[stage] {
+            let path = &node.files[field].path;
+            let bytes = input_file::read_input(path, *hash)?.into();
+            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            files.insert(field.clone(), SourceFile { name, bytes });
+        }
+        Ok(files)
     }
 
     /// The code version of a stage.

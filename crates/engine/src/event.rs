@@ -1,5 +1,6 @@
 //! What happens during a run, in the order in which it happens.
 
+use crate::cache::Damage;
 use crate::error::ExitCode;
 use crate::hash::ContentHash;
 use crate::reason::Reason;
@@ -62,6 +63,15 @@ pub enum Event {
         stage: String,
         /// What it says.
         text: String,
+    },
+    /// A stage that keeps finished parts ends, well or not.
+    StageUnits {
+        /// The stage.
+        stage: String,
+        /// So many parts were there,
+        reused: u64,
+        /// so many were computed and are kept.
+        computed: u64,
     },
     /// A stage is done and its result is in the cache.
     StageFinished {
@@ -133,6 +143,12 @@ pub enum Event {
         /// How long it took, s.
         seconds: f64,
     },
+}
+
+impl Event {
+    pub(crate) fn quarantined(Damage { path, reason, moved_to }: Damage) -> Self {
+        Self::Quarantined { path, reason, moved_to }
+    }
 }
 
 /// Receives events. Called from several threads, one call at a time.

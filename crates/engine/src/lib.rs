@@ -14,6 +14,27 @@
 //! - A process that is killed leaves whole results or none. Processes that need the same result compute it once.
 //! - The bytes a stage is handed are the bytes that were hashed.
 //!
+//! # Finished parts
+//!
+//! A stage of many independent parts (the patches of a fit) gives each of them a key over exactly what it depends on
+//! and asks [`StageContext::units`] first:
+//!
+//! ```ignore
+//! fn run(&self, context: &StageContext<'_>, parameters: &P) -> Result<Surface, StageError> {
+//!     let layout = context.input::<QuadLayout>("input")?;
+//!     // A library that knows no engine takes the handle: `fit(&layout, parameters, context.units(), progress)`.
+//!     let keys: Vec<UnitKey> = patches.iter().map(|p| UnitKey::of("patch").f64s(&p.samples).finish()).collect();
+//!     context.units().announce("patches", &keys);
+//!     patches.par_iter().zip(keys).map(|(patch, key)| context.units().f64s(key, || solve(patch)))...
+//! }
+//! ```
+//!
+//! A part survives a kill as soon as `put` (or `f64s`) returns: it is one append to one file of the run, without a
+//! flush, and it is checked when it is read. It is found by its own key, so that after an edit only the parts whose
+//! content has changed are computed, and only by the same version of the stage's code. `announce` lets `plan` count what an
+//! interrupted run has left; [`Stage::needed_units`] lets it count what an edit leaves. Parts are thrown away by
+//! `cache gc` alone. [`Event::StageUnits`] and [`StageRecord::units`] tell how many were reused.
+//!
 //! # Non-guarantees
 //!
 //! - A stage that depends on anything but its arguments defeats the keys; the engine notices only when such a stage
@@ -73,6 +94,8 @@ mod decide;
 mod diagnostic;
 mod error;
 mod event;
+#[doc(hidden)]
+pub mod failpoint;
 mod graph;
 mod hash;
 mod history;
@@ -89,7 +112,7 @@ mod spec;
 mod stage;
 
 pub use artifact::{ArtifactKind, ArtifactType, Value};
-pub use cache::Cache;
+pub use cache::{Cache, UnitCounts, UnitsAtHand};
 pub use decide::Decision;
 pub use diagnostic::{Diagnostic, Source, nearest};
 pub use error::{EngineError, ExitCode};
@@ -98,7 +121,7 @@ pub use graph::StageGraph;
 pub use hash::{ContentHash, ParseHashError};
 pub use input_file::InputFileError;
 pub use interrupt::Interrupt;
-pub use plan::{Action, Plan, PlannedStage, plan};
+pub use plan::{Action, Plan, PlannedStage, PlannedUnits, plan};
 pub use reason::Reason;
 pub use registry::{ExportError, Exporter, Registry};
 pub use run::{
@@ -109,6 +132,6 @@ pub use schema::{ParameterField, parameter_fields, pipeline_schema};
 pub use selection::Choice;
 pub use spec::{ExportNode, FileInput, Override, OverrideError, Pipeline, Place, SpecError, StageNode};
 pub use stage::{
-    AnyStage, BadValue, FileField, InputPort, ResolvedParameters, SourceFile, Stage, StageContext,
-    StageError, with_causes,
+    AnyStage, BadValue, FileField, InputPort, NeededUnits, ResolvedParameters, SourceFile, Stage,
+    StageContext, StageError, with_causes,
 };

@@ -9,7 +9,7 @@ use std::any::Any;
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 use std::sync::Arc;
-use topipe_progress::Progress;
+use topipe_progress::{Progress, UnitKey, Units};
 
 /// A field of a stage that names another stage, whose artifact it reads.
 #[derive(Debug, Clone)]
@@ -109,6 +109,7 @@ pub struct StageContext<'a> {
     pub(crate) inputs: BTreeMap<&'static str, Value>,
     pub(crate) files: BTreeMap<String, SourceFile>,
     pub(crate) progress: &'a Progress,
+    pub(crate) units: Units,
 }
 
 impl StageContext<'_> {
@@ -140,6 +141,23 @@ impl StageContext<'_> {
     pub fn progress(&self) -> &Progress {
         self.progress
     }
+
+    /// Where finished parts of the result are kept, and those of earlier runs are found: the runs of this kind of
+    /// stage with this version of its code, whatever their inputs and parameters. A part is found by its own key
+    /// alone, which must cover all it depends on; see [`UnitKey`]. Once `put` returns, the part survives a kill. A stage
+    /// that is run by force finds none.
+    pub fn units(&self) -> &Units {
+        &self.units
+    }
+}
+
+/// Parts that a stage is going to need.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NeededUnits {
+    /// What they are, in the plural: "patches".
+    pub what: String,
+    /// Their keys.
+    pub keys: Vec<UnitKey>,
 }
 
 /// One kind of stage. Implementations are thin: the work is done by a library that knows nothing of the engine.
@@ -178,6 +196,19 @@ pub trait Stage: Send + Sync + 'static {
         context: &StageContext<'_>,
         parameters: &Self::Parameters,
     ) -> Result<<Self::Output as ArtifactKind>::Value, StageError>;
+    /// Whether [`Self::needed_units`] has anything to say.
+    const NAMES_UNITS: bool = false;
+    /// The parts that [`Self::run`] would ask [`StageContext::units`] for, as far as they can be named without
+    /// computing any. `plan` calls it for a stage that must run and whose inputs are known, to say how many of them are
+    /// there already; so it should take a small part of the time of a run. It decides nothing.
+    fn needed_units(
+        &self,
+        context: &StageContext<'_>,
+        parameters: &Self::Parameters,
+    ) -> Result<Vec<NeededUnits>, StageError> {
+        let _ = (context, parameters);
+        Ok(Vec::new())
+    }
 }
 
 /// Parameters of a stage with all defaults filled in.
@@ -243,6 +274,14 @@ pub trait AnyStage: Send + Sync {
     fn check(&self, parameters: &ResolvedParameters) -> Result<(), BadValue>;
     /// Runs the stage.
     fn run(&self, context: &StageContext<'_>, parameters: &ResolvedParameters) -> Result<Value, StageError>;
+    /// Whether it can name the parts it needs.
+    fn names_units(&self) -> bool;
+    /// The parts a run would need.
+    fn needed_units(
+        &self,
+        context: &StageContext<'_>,
+        parameters: &ResolvedParameters,
+    ) -> Result<Vec<NeededUnits>, StageError>;
 }
 
 /// Erases the types of a [`Stage`].
@@ -301,12 +340,27 @@ impl<S: Stage> AnyStage for Erased<S> {
     }
 
     fn run(&self, context: &StageContext<'_>, parameters: &ResolvedParameters) -> Result<Value, StageError> {
-        let typed = parameters
-            .typed
-            .downcast_ref::<S::Parameters>()
-            .ok_or_else(|| StageError::Failed("the parameters belong to another kind of stage".into()))?;
-        self.0.run(context, typed).map(|value| Arc::new(value) as Value)
+        self.0.run(context, typed::<S>(parameters)?).map(|value| Arc::new(value) as Value)
     }
+
+    fn names_units(&self) -> bool {
+        S::NAMES_UNITS
+    }
+
+    fn needed_units(
+        &self,
+        context: &StageContext<'_>,
+        parameters: &ResolvedParameters,
+    ) -> Result<Vec<NeededUnits>, StageError> {
+        self.0.needed_units(context, typed::<S>(parameters)?)
+    }
+}
+
+fn typed<S: Stage>(parameters: &ResolvedParameters) -> Result<&S::Parameters, StageError> {
+    parameters
+        .typed
+        .downcast_ref()
+        .ok_or_else(|| StageError::Failed("the parameters belong to another kind of stage".into()))
 }
 
 /// Everything the key of a stage run is made of.

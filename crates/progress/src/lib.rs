@@ -1,7 +1,8 @@
-//! Progress reports and interruption for long-running computations.
+//! What a long computation says while it runs, how it is stopped, and which of its parts it need not do again.
 //!
 //! A stage crate is a plain library: it takes a [`Progress`], tells it how far it is, asks it whether it should
-//! stop, and never prints. Who listens (a progress bar, a JSON stream, nobody) is not its concern.
+//! stop, and never prints. Who listens (a progress bar, a JSON stream, nobody) is not its concern. A computation of
+//! many independent parts may also take [`Units`], a place where finished parts are kept from one run to the next.
 //!
 //! ```
 //! use topipe_progress::Progress;
@@ -12,7 +13,11 @@
 //! }
 //! ```
 //!
-//! Nothing that passes through here may reach an artifact: progress is for people, results are not.
+//! Nothing that passes through a [`Progress`] may reach an artifact: progress is for people, results are not.
+
+mod units;
+
+pub use units::{UnitKey, UnitKeyHasher, UnitStore, Units};
 
 use std::fmt;
 use std::sync::Arc;

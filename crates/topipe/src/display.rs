@@ -102,6 +102,12 @@ impl EventSink for Console {
                 );
             }
             Event::StageRemark { stage, text } => self.line(Verbosity::Verbose, &format!("{stage}: {text}")),
+            Event::StageUnits { stage, reused, computed } => {
+                self.line(
+                    Verbosity::Verbose,
+                    &format!("{stage}: {reused} parts reused, {computed} computed"),
+                );
+            }
             Event::StageFinished { stage, .. } => self.end(stage),
             Event::StageFailed { stage, message, .. } => {
                 self.end(stage);

@@ -20,19 +20,23 @@ pub enum Bucket {
     History,
     /// `exports-v1/ab/cdef...`: what was last written into an output folder, under the hash of its path; sealed JSON.
     Exports,
+    /// `units-v1/NAMESPACE/STAGE-KEY`: finished parts of stage runs, one file for each run that made any; the namespace is
+    /// a hash of the kind of stage and its code version.
+    Units,
     /// `quarantine/`: files that did not verify, kept for a look.
     Quarantine,
 }
 
 impl Bucket {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Artifacts,
         Self::Keys,
         Self::Locks,
         Self::Files,
         Self::History,
         Self::Exports,
+        Self::Units,
         Self::Quarantine,
     ];
 
@@ -45,6 +49,7 @@ impl Bucket {
             Self::Files => "files-v1",
             Self::History => "history-v1",
             Self::Exports => "exports-v1",
+            Self::Units => "units-v1",
             Self::Quarantine => "quarantine",
         }
     }
@@ -55,7 +60,7 @@ impl Bucket {
         let hex = hash.to_hex();
         let folder = root.join(self.folder());
         match self {
-            Self::Locks | Self::Quarantine => folder.join(hex),
+            Self::Locks | Self::Units | Self::Quarantine => folder.join(hex),
             _ => folder.join(&hex[..2]).join(&hex[2..]),
         }
     }

@@ -5,11 +5,15 @@
 //! it, flushed, renamed), and the record that makes a result findable is published last, so a kill at any time leaves
 //! either a whole result or none.
 
+mod checkpoints;
 mod layout;
 mod lock;
 mod seal;
+mod segment;
 mod store;
 
+pub(crate) use checkpoints::UnitCheckpoints;
+pub use checkpoints::{UnitCounts, UnitsAtHand};
 pub use layout::Bucket;
 pub use lock::{KeyLock, LockError};
 pub(crate) use seal::{seal, unseal};

@@ -131,7 +131,9 @@ impl Cache {
     /// Publishes the record of a key. Its artifact must be stored already.
     pub fn publish(&self, record: &KeyRecord) -> Result<(), CacheError> {
         let bytes = seal(record).map_err(|error| CacheError::Record(error.to_string()))?;
-        write_atomically(&self.path(Bucket::Keys, record.key), &bytes)
+        write_atomically(&self.path(Bucket::Keys, record.key), &bytes)?;
+        crate::failpoint::pass("key published");
+        Ok(())
     }
 
     /// Whether the artifact of a record is there with the right length. Its content is verified when it is read.
@@ -161,6 +163,7 @@ impl Cache {
             return Ok(StoredArtifact { hash, bytes: file.len() as u64 });
         }
         write_atomically(&path, &file)?;
+        crate::failpoint::pass("artifact stored");
         Ok(StoredArtifact { hash, bytes: file.len() as u64 })
     }
 
@@ -220,7 +223,7 @@ impl Cache {
     }
 
     /// Moves a file out of the way.
-    fn quarantine(&self, path: &Path, reason: impl Into<String>) -> Damage {
+    pub(super) fn quarantine(&self, path: &Path, reason: impl Into<String>) -> Damage {
         let folder = self.root.join(Bucket::Quarantine.folder());
         let name: String = path
             .strip_prefix(&self.root)
@@ -281,6 +284,12 @@ impl Cache {
                 None => Err("its name is not a hash".into()),
             };
             match verified {
+                Ok(()) => good += 1,
+                Err(reason) => damages.push(self.quarantine(&path, reason)),
+            }
+        }
+        for path in self.files(Bucket::Units)? {
+            match Self::verify_units(&path) {
                 Ok(()) => good += 1,
                 Err(reason) => damages.push(self.quarantine(&path, reason)),
             }
@@ -367,6 +376,10 @@ pub(crate) fn persist(file: tempfile::NamedTempFile, path: &Path) -> Result<(), 
         // Temporary files are private; what is shared should not be.
         file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(fail)?;
     }
+    crate::failpoint::pass("temporary written");
     file.as_file().sync_data().map_err(fail)?;
-    file.persist(path).map(drop).map_err(|error| fail(error.error))
+    crate::failpoint::pass("temporary flushed");
+    file.persist(path).map_err(|error| fail(error.error))?;
+    crate::failpoint::pass("file renamed");
+    Ok(())
 }

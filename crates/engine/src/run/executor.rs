@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::produce::Settled;
 use super::{Events, FileRecord, InputRecord, Outcome, RunOptions, StageRecord};
 use crate::artifact::Value;
-use crate::cache::{Bucket, Damage, KeyRecord};
+use crate::cache::{Bucket, Damage, KeyRecord, UnitCounts};
 use crate::decide::{Decider, Decision, InputHashes};
 use crate::error::ExitCode;
 use crate::event::Event;
@@ -24,6 +24,7 @@ pub(super) struct Slot {
     key: Option<ContentHash>,
     pub(super) record: Option<KeyRecord>,
     peak_memory: Option<u64>,
+    units: Option<UnitCounts>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -214,7 +215,7 @@ impl<'a> Executor<'a> {
             Settled::Found(record) => self.found(stage, record),
             Settled::Produced(produced) => {
                 *lock(&self.values[stage]) = Some(Arc::clone(&produced.value));
-                self.computed(stage, produced.record);
+                self.computed(stage, produced.record, produced.units);
             }
         }
         Ok(())
@@ -233,7 +234,7 @@ impl<'a> Executor<'a> {
         slot.record = Some(record);
     }
 
-    pub(super) fn computed(&self, stage: usize, record: KeyRecord) {
+    pub(super) fn computed(&self, stage: usize, record: KeyRecord, units: Option<UnitCounts>) {
         self.events.emit(&Event::StageFinished {
             stage: self.node(stage).name.clone(),
             artifact: record.artifact,
@@ -245,6 +246,7 @@ impl<'a> Executor<'a> {
         slot.key = Some(record.key);
         slot.record = Some(record);
         slot.peak_memory = machine::peak_memory();
+        slot.units = units;
     }
 
     fn input_hashes(&self, stage: usize) -> InputHashes {
@@ -260,8 +262,8 @@ impl<'a> Executor<'a> {
     pub(super) fn with_damages<T>(&self, action: impl FnOnce(&mut Vec<Damage>) -> T) -> T {
         let mut damages = Vec::new();
         let result = action(&mut damages);
-        for Damage { path, reason, moved_to } in damages {
-            self.events.emit(&Event::Quarantined { path, reason, moved_to });
+        for damage in damages {
+            self.events.emit(&Event::quarantined(damage));
         }
         result
     }
@@ -329,6 +331,7 @@ impl<'a> Executor<'a> {
             seconds: record.as_ref().map(|record| record.seconds),
             remarks: record.map(|record| record.remarks).unwrap_or_default(),
             peak_memory_bytes: slot.peak_memory,
+            units: slot.units,
         }
     }
 }

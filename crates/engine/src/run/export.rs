@@ -135,6 +135,7 @@ fn write(
     let bytes = file.bytes;
     let temporary = file.file.into_inner().map_err(|error| fail(error.into_error()))?;
     persist(temporary, path)?;
+    crate::failpoint::pass("export written");
     let writer = export.exporter.code_version.clone();
     Ok(WrittenFile { artifact, writer, content, bytes, memo: None })
 }

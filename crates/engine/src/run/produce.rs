@@ -4,23 +4,23 @@ use super::executor::{Executor, lock};
 use super::failure::Failure;
 use super::listener::StageListener;
 use crate::artifact::Value;
-use crate::cache::KeyRecord;
+use crate::cache::{KeyRecord, UnitCheckpoints, UnitCounts};
 use crate::error::ExitCode;
 use crate::event::Event;
 use crate::hash::ContentHash;
-use crate::input_file;
 use crate::reason::Reason;
-use crate::stage::{SourceFile, StageContext, StageError};
+use crate::stage::{StageContext, StageError};
 use std::collections::BTreeMap;
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::Instant;
-use topipe_progress::Progress;
+use topipe_progress::{Progress, Units};
 
 /// The result of a computation.
 pub(super) struct Produced {
     pub(super) value: Value,
     pub(super) record: KeyRecord,
+    pub(super) units: Option<UnitCounts>,
 }
 
 /// What came of asking for a result under its lock.
@@ -48,20 +48,36 @@ impl Executor<'_> {
         if look_again && let Some(record) = self.with_damages(|damages| self.decider.lookup(key, damages))? {
             return Ok(Settled::Found(record));
         }
+        crate::failpoint::pass("lock taken");
+        let forced = reasons.contains(&Reason::Forced);
         self.events.emit(&Event::StageStarted { stage: node.name.clone(), key, reasons });
         let mut inputs = BTreeMap::new();
         for (&port, &from) in &node.inputs {
             inputs.insert(port, self.obtain(from)?);
         }
-        let files = self.read_files(stage)?;
+        let files = self.decider.read_files(stage)?;
         let listener =
             Arc::new(StageListener::new(&node.name, self.interrupt.clone(), Arc::clone(&self.events)));
         let progress = Progress::new(listener.clone());
-        let context = StageContext { inputs, files, progress: &progress };
+        let events = Arc::clone(&self.events);
+        let checkpoints = Arc::new(UnitCheckpoints::new(
+            self.cache(),
+            node.stage.kind(),
+            self.decider.code_version(stage),
+            key,
+            forced,
+            move |damage| events.emit(&Event::quarantined(damage)),
+        ));
+        let units = Units::new(checkpoints.clone());
+        let context = StageContext { inputs, files, progress: &progress, units };
         let start = Instant::now();
         // What the stage may have left half done is its own: inputs are shared read-only.
         let result =
             std::panic::catch_unwind(AssertUnwindSafe(|| node.stage.run(&context, &node.parameters)));
+        let units = Some(checkpoints.finish()).filter(|counts| *counts != UnitCounts::default());
+        if let Some(UnitCounts { reused, computed }) = units {
+            self.events.emit(&Event::StageUnits { stage: node.name.clone(), reused, computed });
+        }
         let value = match result {
             Ok(value) => value?,
             Err(payload) => return Err(panicked(payload.as_ref()).into()),
@@ -81,19 +97,7 @@ impl Executor<'_> {
             tracing::warn!("stage `{}` gave another result than before from the same input", node.name);
         }
         self.cache().publish(&record)?;
-        Ok(Settled::Produced(Produced { value, record }))
-    }
-
-    fn read_files(&self, stage: usize) -> Result<BTreeMap<String, SourceFile>, Failure> {
-        let node = self.node(stage);
-        let mut files = BTreeMap::new();
-        for (field, (_, hash)) in self.decider.files(stage) {
-            let path = &node.files[field].path;
-            let bytes = input_file::read_input(path, *hash)?.into();
-            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-            files.insert(field.clone(), SourceFile { name, bytes });
-        }
-        Ok(files)
+        Ok(Settled::Produced(Produced { value, record, units }))
     }
 
     /// The result of a stage that has been settled: from memory, from the cache, or, if it is damaged or gone there,
@@ -126,7 +130,7 @@ impl Executor<'_> {
                     })?,
                     Settled::Produced(produced) if produced.record.artifact == record.artifact => {
                         lock(&self.slots[stage]).reasons = vec![reason];
-                        self.computed(stage, produced.record);
+                        self.computed(stage, produced.record, produced.units);
                         produced.value
                     }
                     Settled::Produced(_) => {

@@ -1,6 +1,6 @@
 //! `run.json`: enough to repeat a run and to compare two.
 
-use crate::cache::CacheError;
+use crate::cache::{CacheError, UnitCounts};
 use crate::error::ExitCode;
 use crate::hash::ContentHash;
 use crate::machine;
@@ -122,6 +122,8 @@ pub struct StageRecord {
     pub remarks: Vec<String>,
     /// The most memory the process had held by the time it was done, with whatever ran beside it.
     pub peak_memory_bytes: Option<u64>,
+    /// Where the stage keeps finished parts: how many this run found and how many it computed.
+    pub units: Option<UnitCounts>,
 }
 
 /// An input of a stage.
@@ -192,6 +194,8 @@ impl RunRecord {
             use std::os::unix::fs::PermissionsExt;
             file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(fail)?;
         }
-        file.persist(&path).map(drop).map_err(|error| fail(error.error))
+        file.persist(&path).map_err(|error| fail(error.error))?;
+        crate::failpoint::pass("run record written");
+        Ok(())
     }
 }

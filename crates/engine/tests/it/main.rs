@@ -2,6 +2,7 @@
 
 mod cache_damage;
 mod caching;
+mod child;
 mod concurrency;
 mod exports;
 mod failures;
@@ -10,3 +11,4 @@ mod schema;
 mod selection;
 mod spec_errors;
 mod toy;
+mod units;

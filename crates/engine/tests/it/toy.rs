@@ -7,8 +7,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use topipe_engine::{
     ArtifactKind, BadValue, Cache, Choice, Event, ExitCode, Exporter, FileField, InputPort, Interrupt,
-    Override, Pipeline, Plan, Registry, RunOptions, RunRecord, Stage, StageContext, StageError, plan, run,
+    NeededUnits, Override, Pipeline, Plan, Registry, RunOptions, RunRecord, Stage, StageContext, StageError,
+    plan, run,
 };
+use topipe_progress::UnitKey;
 
 pub(crate) struct Text;
 impl ArtifactKind for Text {
@@ -212,6 +214,77 @@ impl Stage for Slow {
     }
 }
 
+/// Writes each word of a text in capitals, and keeps each word as it is done.
+#[derive(Default)]
+pub(crate) struct Shout {
+    /// Goes no further after so many words: hangs until the process is killed, or until it is interrupted.
+    pub hang_after: Option<usize>,
+}
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct ShoutParameters {
+    /// What stands between words. No word depends on it.
+    pub between: String,
+    /// What follows each word.
+    pub mark: String,
+}
+impl Default for ShoutParameters {
+    fn default() -> Self {
+        Self { between: " ".into(), mark: String::new() }
+    }
+}
+impl Stage for Shout {
+    type Parameters = ShoutParameters;
+    type Output = Text;
+    const KIND: &'static str = "shout";
+    const SUMMARY: &'static str = "Writes each word in capitals.";
+    const NAMES_UNITS: bool = true;
+    fn code_version(&self) -> String {
+        "1".into()
+    }
+    fn inputs(&self) -> Vec<InputPort> {
+        vec![InputPort::required::<Text>("input", "The text.")]
+    }
+    fn needed_units(
+        &self,
+        context: &StageContext<'_>,
+        parameters: &ShoutParameters,
+    ) -> Result<Vec<NeededUnits>, StageError> {
+        let text = context.input::<Text>("input")?;
+        let key = |word: &str| {
+            UnitKey::of("word").bytes(word.as_bytes()).bytes(parameters.mark.as_bytes()).finish()
+        };
+        Ok(vec![NeededUnits { what: "words".into(), keys: text.split_whitespace().map(key).collect() }])
+    }
+    fn run(&self, context: &StageContext<'_>, parameters: &ShoutParameters) -> Result<String, StageError> {
+        let text = context.input::<Text>("input")?;
+        let keys = self.needed_units(context, parameters)?.remove(0).keys;
+        context.units().announce("words", &keys);
+        let (mut words, mut made) = (Vec::new(), 0);
+        for (word, key) in text.split_whitespace().zip(keys) {
+            if let Some(kept) = context.units().get(key) {
+                words.push(String::from_utf8(kept).map_err(|error| StageError::Failed(error.to_string()))?);
+                continue;
+            }
+            if Some(made) == self.hang_after {
+                context.progress().step(made as u64, 0, "hangs");
+                loop {
+                    context.progress().check()?;
+                    std::thread::sleep(std::time::Duration::from_millis(1));
+                }
+            }
+            made += 1;
+            let word = word.to_uppercase() + &parameters.mark;
+            if made <= 10 {
+                context.progress().remark(&word);
+            }
+            context.units().put(key, word.as_bytes());
+            words.push(word);
+        }
+        Ok(words.join(&parameters.between))
+    }
+}
+
 pub(crate) fn registry() -> Registry {
     Registry::new()
         .with_stage(Read)
@@ -257,7 +330,9 @@ input = "loud"
 
 /// A folder with a pipeline, its input and its cache.
 pub(crate) struct Workshop {
-    pub folder: tempfile::TempDir,
+    folder: PathBuf,
+    /// Deletes the folder in the end, if it is ours.
+    _owned: Option<tempfile::TempDir>,
     pub registry: Registry,
     pub options: RunOptions,
     pub interrupt: Interrupt,
@@ -266,15 +341,25 @@ pub(crate) struct Workshop {
 impl Workshop {
     pub(crate) fn new(spec: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let options = RunOptions::new(folder.path().join("out"));
-        let shop = Self { folder, registry: registry(), options, interrupt: Interrupt::new() };
+        let mut shop = Self::at(folder.path().to_owned());
+        shop._owned = Some(folder);
         shop.write("in.txt", "hello");
         shop.write("p.toml", spec);
         shop
     }
 
+    /// The workshop that another process has made.
+    pub(crate) fn at(folder: PathBuf) -> Self {
+        let options = RunOptions::new(folder.join("out"));
+        Self { folder, _owned: None, registry: registry(), options, interrupt: Interrupt::new() }
+    }
+
+    pub(crate) fn folder(&self) -> &std::path::Path {
+        &self.folder
+    }
+
     pub(crate) fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        self.folder.join(name)
     }
 
     pub(crate) fn write(&self, name: &str, text: &str) {
@@ -312,10 +397,35 @@ impl Workshop {
         self.run_with(&[], &self.options)
     }
 
+    /// Runs no further than to this stage.
+    pub(crate) fn run_until(&self, stage: &str) -> (RunRecord, Vec<String>) {
+        let mut options = self.options.clone();
+        options.choice.until = vec![stage.into()];
+        self.run_with(&[], &options)
+    }
+
     pub(crate) fn run_with(&self, sets: &[&str], options: &RunOptions) -> (RunRecord, Vec<String>) {
+        self.run_watched(sets, options, |_| {})
+    }
+
+    /// Runs and tells `watch` of each line as it comes.
+    pub(crate) fn run_and(&self, watch: impl Fn(&str) + Send + Sync + 'static) -> (RunRecord, Vec<String>) {
+        self.run_watched(&[], &self.options, watch)
+    }
+
+    fn run_watched(
+        &self,
+        sets: &[&str],
+        options: &RunOptions,
+        watch: impl Fn(&str) + Send + Sync + 'static,
+    ) -> (RunRecord, Vec<String>) {
         let log = Arc::new(Mutex::new(Vec::new()));
         let into = Arc::clone(&log);
-        let sink = Arc::new(move |event: &Event| into.lock().unwrap().push(line(event)));
+        let sink = Arc::new(move |event: &Event| {
+            let line = line(event);
+            watch(&line);
+            into.lock().unwrap().push(line);
+        });
         let record = run(&self.pipeline(sets), &self.cache(), options, &self.interrupt, sink).unwrap();
         let lines = log.lock().unwrap().clone();
         (record, lines)
@@ -347,6 +457,9 @@ pub(crate) fn line(event: &Event) -> String {
         }
         Event::StageProgress { stage, .. } => format!("{stage} progresses"),
         Event::StageRemark { stage, text } => format!("{stage} remarks: {text}"),
+        Event::StageUnits { stage, reused, computed } => {
+            format!("{stage} units: {reused} reused, {computed} computed")
+        }
         Event::StageFinished { stage, .. } => format!("{stage} finished"),
         Event::StageFailed { stage, message, code } => {
             format!("{stage} failed ({}): {message}", code.number())

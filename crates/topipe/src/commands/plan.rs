@@ -4,7 +4,7 @@ use crate::args::PlanArguments;
 use crate::failure::Failure;
 use crate::stages::registry;
 use std::fmt::Write;
-use topipe_engine::{Action, Cache, ExitCode, Pipeline, Plan, plan};
+use topipe_engine::{Action, Cache, ExitCode, Pipeline, Plan, PlannedUnits, UnitsAtHand, plan};
 
 pub(crate) fn run(arguments: &PlanArguments) -> Result<ExitCode, Failure> {
     let pipeline = Pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry())?;
@@ -38,6 +38,23 @@ fn describe(plan: &Plan) -> String {
         for reason in &stage.reasons {
             let _ = writeln!(text, "  {:names$}  {:kinds$}    {reason}", "", "");
         }
+        if let Some(units) = &stage.units {
+            let _ = writeln!(text, "  {:names$}  {:kinds$}    {}", "", "", parts_at_hand(units));
+        }
     }
     text
+}
+
+/// "resumes: 812 of 876 patches kept from an interrupted run".
+fn parts_at_hand(units: &PlannedUnits) -> String {
+    let count = |units: &[UnitsAtHand]| {
+        let each = units.iter().map(|units| format!("{} of {} {}", units.kept, units.total, units.what));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    match units {
+        PlannedUnits::InterruptedRun { units } => {
+            format!("resumes: {} kept from an interrupted run", count(units))
+        }
+        PlannedUnits::EarlierRuns { units } => format!("reuses: {} from earlier runs", count(units)),
+    }
 }
