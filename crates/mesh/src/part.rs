@@ -40,6 +40,36 @@ pub enum RegionShape {
     },
 }
 
+impl RegionShape {
+    /// The distance of `p`, mm, positive out of the material.
+    pub fn distance(&self, p: DVec3) -> f64 {
+        match *self {
+            Self::Plane { point, normal } => normal.dot(p - point),
+            Self::Cylinder { point, axis, radius, hole } => {
+                let out = (p - point).reject_from_normalized(axis).length() - radius;
+                if hole { -out } else { out }
+            }
+        }
+    }
+
+    /// The unit normal out of the material at the point of the shape nearest to `p`; zero on the axis of a cylinder,
+    /// where there is no such point.
+    pub fn normal(&self, p: DVec3) -> DVec3 {
+        match *self {
+            Self::Plane { normal, .. } => normal,
+            Self::Cylinder { point, axis, hole, .. } => {
+                let out = (p - point).reject_from_normalized(axis).normalize_or_zero();
+                if hole { -out } else { out }
+            }
+        }
+    }
+
+    /// The point of the shape nearest to `p`; `p` itself on the axis of a cylinder.
+    pub fn project(&self, p: DVec3) -> DVec3 {
+        p - self.normal(p) * self.distance(p)
+    }
+}
+
 /// A connected set of faces with a known shape, detected or declared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Region {
@@ -172,6 +202,27 @@ impl Part {
             provenance: (0..vertices).map(|v| Provenance::Vertex(VertexId::new(v))).collect(),
             import: ImportRecord { format: String::new(), scale_to_mm: 1.0, repairs: Vec::new() },
             smoothing: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distance_grows_out_of_the_material() {
+        let plane = RegionShape::Plane { point: DVec3::new(1.0, 2.0, 3.0), normal: DVec3::Z };
+        assert_eq!(plane.distance(DVec3::new(9.0, 9.0, 5.0)), 2.0);
+        for (hole, sign) in [(false, 1.0), (true, -1.0)] {
+            let wall =
+                RegionShape::Cylinder { point: DVec3::new(4.0, 5.0, 0.0), axis: DVec3::Z, radius: 2.0, hole };
+            let p = DVec3::new(4.0, 8.0, 7.0);
+            assert!((wall.distance(p) - sign).abs() < 1e-15);
+            assert!((wall.normal(p) - DVec3::Y * sign).length() < 1e-15);
+            assert!((wall.project(p) - DVec3::new(4.0, 7.0, 7.0)).length() < 1e-15);
+            let on_axis = DVec3::new(4.0, 5.0, 1.0);
+            assert_eq!(wall.project(on_axis), on_axis);
         }
     }
 }

@@ -11,11 +11,15 @@
 //! of quads with corners near 180 degrees are regular.
 
 pub mod basis;
+#[allow(dead_code)] // The fit is about to use it.
+mod borders;
 mod cholesky;
 mod energy;
 mod error;
 mod fit;
 mod foot_points;
+#[allow(dead_code)] // Used by the borders.
+mod hermite;
 mod parameters;
 mod samples;
 mod shells;

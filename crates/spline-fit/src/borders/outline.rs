@@ -1,0 +1,349 @@
+//! Smooth curves for the ragged borders between a region and the free surface.
+//!
+//! The border is developed into the plane (a cylinder is unrolled), smoothed there as one curve from corner to corner,
+//! and brought back onto the shape. On a plane that is exact. On a cylinder a border that goes around is written with
+//! the angle as its parameter: across the axis it then is a circle in equal spans, with the accuracy of the sixth order
+//! that an arc has, and along the axis any cubic. Other borders on a cylinder get as many spans as the tolerance takes.
+
+use super::Borders;
+use super::chains::Chain;
+use super::smoothing_curve::{Curve, Sample, fit as smooth};
+use crate::hermite::{self, Circle};
+use crate::{Basis, CurveShape, EdgeCurve};
+use glam::DVec2;
+use std::f64::consts::PI;
+use topipe_mesh::{DVec3, RegionShape};
+use topipe_quad_matching::QuadLayout;
+
+/// Waves of the border shorter than this many mean edge lengths are teeth of the mesh and damped to less than half.
+const SHORTEST_WAVE: f64 = 4.0;
+/// Spans of the reference curve are at most this many mean edge lengths long.
+const FINEST_SPAN: f64 = 2.0;
+/// Spans are joined as long as the curve moves by less than this share of the mean edge length.
+const COARSENING: f64 = 0.01;
+const MOST_SPANS: usize = 64;
+
+/// A shape unrolled into the plane.
+struct Development {
+    shape: RegionShape,
+    origin: DVec3,
+    u: DVec3,
+    v: DVec3,
+    radius: Option<f64>,
+}
+
+impl Development {
+    fn new(shape: &RegionShape) -> Self {
+        match *shape {
+            RegionShape::Plane { point, normal } => {
+                let (u, v) = normal.any_orthonormal_pair();
+                Self { shape: *shape, origin: point, u, v, radius: None }
+            }
+            RegionShape::Cylinder { point, axis, radius, .. } => {
+                let circle = Circle::about(point, axis, radius);
+                Self { shape: *shape, origin: point, u: circle.u, v: circle.v, radius: Some(radius) }
+            }
+        }
+    }
+
+    fn axis(&self) -> DVec3 {
+        match self.shape {
+            RegionShape::Plane { normal, .. } => normal,
+            RegionShape::Cylinder { axis, .. } => axis,
+        }
+    }
+
+    /// Where `p` lies; on a cylinder on the sheet nearest to `near`.
+    fn develop(&self, p: DVec3, near: Option<DVec2>) -> DVec2 {
+        let d = p - self.origin;
+        let Some(radius) = self.radius else { return DVec2::new(d.dot(self.u), d.dot(self.v)) };
+        let turn = 2.0 * PI * radius;
+        let x = radius * d.dot(self.v).atan2(d.dot(self.u));
+        let x = near.map_or(x, |near| x + turn * ((near.x - x) / turn).round());
+        DVec2::new(x, d.dot(self.axis()))
+    }
+
+    fn position(&self, q: DVec2) -> DVec3 {
+        match self.radius {
+            None => self.origin + self.u * q.x + self.v * q.y,
+            Some(radius) => {
+                let (s, c) = (q.x / radius).sin_cos();
+                self.origin + (self.u * c + self.v * s) * radius + self.axis() * q.y
+            }
+        }
+    }
+
+    /// The direction on the shape at `q` that is developed into `direction`.
+    fn lift(&self, q: DVec2, direction: DVec2) -> DVec3 {
+        match self.radius {
+            None => self.u * direction.x + self.v * direction.y,
+            Some(radius) => {
+                let (s, c) = (q.x / radius).sin_cos();
+                (self.v * c - self.u * s) * direction.x + self.axis() * direction.y
+            }
+        }
+    }
+}
+
+/// Fits the chain; sets its curves, and the vertices inside it.
+pub(super) fn fit(layout: &QuadLayout, chain: &Chain, shape: &RegionShape, borders: &mut Borders) {
+    let development = Development::new(shape);
+    let edge_length = layout.part.mesh.mean_edge_length();
+    let outline = Outline::new(layout, chain, &development, borders);
+    let Some(curve) = outline.curve(chain, edge_length) else { return };
+
+    // Vertices inside the chain move onto the curve.
+    let count = chain.sides.len();
+    let inner = usize::from(!chain.closed);
+    for k in inner..count {
+        let q = curve.at(outline.starts[k]).0;
+        borders.vertices[layout.start(chain.sides[k]) as usize] = Some(development.position(q));
+    }
+    for (k, &side) in chain.sides.iter().enumerate() {
+        let range = [outline.starts[k], outline.starts[k + 1]];
+        let found = match development.radius {
+            None => plane_piece(&development, &curve, range),
+            Some(radius) => {
+                let circle =
+                    Circle { center: development.origin, u: development.u, v: development.v, radius };
+                around_piece(
+                    &development,
+                    &circle,
+                    &curve,
+                    range,
+                    borders.tolerance,
+                    COARSENING * edge_length,
+                )
+                .or_else(|| cylinder_piece(&development, &curve, range, borders.tolerance))
+            }
+        };
+        let Some((basis, mut control)) = found else { continue };
+        let edge = &layout.edges[side.edge as usize];
+        if side.reversed {
+            control.reverse();
+        }
+        let last = control.len() - 1;
+        for (place, v) in [(0, edge.ends[0]), (last, edge.ends[1])] {
+            if let Some(p) = borders.vertices[v as usize] {
+                control[place] = p;
+            }
+        }
+        borders.curves[side.edge as usize] =
+            Some(EdgeCurve { ends: edge.ends, basis, control, feature: None, shape: CurveShape::Spline });
+    }
+}
+
+/// The developed polyline of a chain.
+struct Outline {
+    points: Vec<DVec2>,
+    /// Length up to each point.
+    along: Vec<f64>,
+    /// Length up to each vertex of the layout, the end of the chain included.
+    starts: Vec<f64>,
+}
+
+impl Outline {
+    fn new(layout: &QuadLayout, chain: &Chain, development: &Development, borders: &Borders) -> Self {
+        let mut points: Vec<DVec2> = Vec::new();
+        let mut at_vertex = vec![0];
+        for &side in &chain.sides {
+            let path = layout.path(side);
+            let last = path.len() - 1;
+            for (i, &v) in path.iter().enumerate().skip(usize::from(!points.is_empty())) {
+                let edge = &layout.edges[side.edge as usize];
+                let end = if i == 0 { Some(side.reversed) } else { (i == last).then_some(!side.reversed) };
+                let exact = end.and_then(|end| borders.vertices[edge.ends[usize::from(end)] as usize]);
+                let p = exact.unwrap_or(layout.part.mesh.position(v));
+                points.push(development.develop(p, points.last().copied()));
+            }
+            at_vertex.push(points.len() - 1);
+        }
+        let mut along = vec![0.0];
+        for w in points.windows(2) {
+            along.push(along[along.len() - 1] + w[0].distance(w[1]));
+        }
+        let starts = at_vertex.into_iter().map(|k| along[k]).collect();
+        Self { points, along, starts }
+    }
+
+    /// The smoothing spline with as few spans as keep it.
+    fn curve(&self, chain: &Chain, edge_length: f64) -> Option<Curve> {
+        let length = self.along[self.along.len() - 1];
+        if !(length > 0.0 && self.starts.windows(2).all(|w| w[0] < w[1])) {
+            return None;
+        }
+        let (first, last) = (self.points[0], self.points[self.points.len() - 1]);
+        // Once around a cylinder: what is left without the way around is closed.
+        let ramp = if chain.closed { (last - first) / length } else { DVec2::ZERO };
+        let mut samples = Vec::new();
+        for k in 1..self.points.len() {
+            let piece = self.along[k] - self.along[k - 1];
+            // Simpson's rule between the vertices, so that a long piece counts by its length.
+            for (x, share) in [(0.0, 1.0 / 6.0), (0.5, 2.0 / 3.0), (1.0, 1.0 / 6.0)] {
+                let s = self.along[k - 1] + x * piece;
+                let point = self.points[k - 1].lerp(self.points[k], x) - ramp * s;
+                if piece > 0.0 {
+                    samples.push(Sample { s, point, weight: piece * share });
+                }
+            }
+        }
+        let ends = (!chain.closed).then_some([first, last]);
+        let mu = (SHORTEST_WAVE * edge_length / (2.0 * PI)).powi(4);
+        let finest: Vec<usize> = self
+            .starts
+            .windows(2)
+            .map(|w| {
+                let wanted = (w[1] - w[0]) / (FINEST_SPAN * edge_length);
+                (1..).map(|k| 1 << k).find(|&n| n as f64 >= wanted || n >= MOST_SPANS).unwrap_or(1)
+            })
+            .collect();
+        let with = |shift: u32| {
+            let mut breaks = vec![self.starts[0]];
+            for (w, &n) in self.starts.windows(2).zip(&finest) {
+                let n = (n >> shift).max(1);
+                for k in 1..=n {
+                    breaks.push(if k == n { w[1] } else { w[0] + (w[1] - w[0]) * k as f64 / n as f64 });
+                }
+            }
+            smooth(&breaks, &samples, ends, mu)
+        };
+        let reference = with(0)?;
+        let mut best = reference.clone();
+        for shift in 1..=MOST_SPANS.trailing_zeros() {
+            let moved = |c: &Curve| {
+                samples
+                    .iter()
+                    .map(|sample| c.at(sample.s).0.distance(reference.at(sample.s).0))
+                    .fold(0.0, f64::max)
+            };
+            match with(shift) {
+                Some(coarser) if moved(&coarser) <= COARSENING * edge_length => best = coarser,
+                _ => break,
+            }
+        }
+        for k in 0..best.points.len() {
+            best.points[k] += ramp * best.breaks[k];
+            best.slopes[k] += ramp;
+        }
+        Some(best)
+    }
+}
+
+/// Number of spans of `curve` between two vertices.
+fn spans(curve: &Curve, range: [f64; 2]) -> usize {
+    curve.breaks.iter().filter(|&&b| b >= range[0] && b < range[1]).count()
+}
+
+fn plane_piece(development: &Development, curve: &Curve, range: [f64; 2]) -> Option<(Basis, Vec<DVec3>)> {
+    let spans = spans(curve, range);
+    let length = range[1] - range[0];
+    let (mut points, mut slopes) = (Vec::new(), Vec::new());
+    for k in 0..=spans {
+        let (q, slope) = curve.at(range[0] + length * k as f64 / spans as f64);
+        points.push(development.position(q));
+        slopes.push(development.lift(q, slope * length));
+    }
+    Some((hermite::basis(spans)?, hermite::control(&points, &slopes)))
+}
+
+/// A piece that goes around the axis, never steeper than this slope.
+const STEEPEST: f64 = 2.0;
+
+fn around_piece(
+    development: &Development,
+    circle: &Circle,
+    curve: &Curve,
+    range: [f64; 2],
+    tolerance: f64,
+    axial: f64,
+) -> Option<(Basis, Vec<DVec3>)> {
+    let checks = 16 * spans(curve, range);
+    let place = |x: f64| range[0] + (range[1] - range[0]) * x;
+    let forward = curve.at(range[1]).0.x - curve.at(range[0]).0.x;
+    let monotone = (0..=checks).all(|k| {
+        let slope = curve.at(place(k as f64 / checks as f64)).1;
+        slope.x * forward > 0.0 && slope.y.abs() <= STEEPEST * slope.x.abs()
+    });
+    if !monotone {
+        return None;
+    }
+    let (from, to) = (curve.at(range[0]).0.x, curve.at(range[1]).0.x);
+    // The place at which the curve has come so far around, by bisection.
+    let reach = |x: f64| {
+        let (mut low, mut high) = (range[0], range[1]);
+        for _ in 0..60 {
+            let middle = (low + high) / 2.0;
+            if (curve.at(middle).0.x - x) * forward < 0.0 { low = middle } else { high = middle }
+        }
+        (low + high) / 2.0
+    };
+    let sweep = (to - from) / circle.radius;
+    let mut spans = spans(curve, range).max(circle.spans(sweep, tolerance));
+    loop {
+        let mut control = circle.control(from / circle.radius, sweep, spans);
+        let (mut heights, mut slopes) = (Vec::new(), Vec::new());
+        for k in 0..=spans {
+            let s = if k == 0 {
+                range[0]
+            } else if k == spans {
+                range[1]
+            } else {
+                reach(from + (to - from) * k as f64 / spans as f64)
+            };
+            let (q, slope) = curve.at(s);
+            heights.push(DVec3::Z * q.y);
+            slopes.push(DVec3::Z * (slope.y / slope.x * (to - from)));
+        }
+        let heights = hermite::control(&heights, &slopes);
+        let basis = hermite::basis(spans)?;
+        let height = |t: f64| {
+            let local = basis.evaluate(t);
+            (0..local.count).map(|k| local.derivatives[0][k] * heights[local.first + k].z).sum::<f64>()
+        };
+        let far = (0..4 * spans)
+            .map(|k| {
+                let t = (k as f64 + 0.5) / (4 * spans) as f64;
+                (height(t) - curve.at(reach(from + (to - from) * t)).0.y).abs()
+            })
+            .fold(0.0, f64::max);
+        if far <= axial || spans >= MOST_SPANS {
+            for (p, height) in control.iter_mut().zip(heights) {
+                *p += development.axis() * height.z;
+            }
+            return Some((basis, control));
+        }
+        spans *= 2;
+    }
+}
+
+/// Any piece on a cylinder: points and directions of the curve, on as many spans as the tolerance takes.
+fn cylinder_piece(
+    development: &Development,
+    curve: &Curve,
+    range: [f64; 2],
+    tolerance: f64,
+) -> Option<(Basis, Vec<DVec3>)> {
+    let mut spans = spans(curve, range);
+    loop {
+        let length = range[1] - range[0];
+        let (mut points, mut slopes) = (Vec::new(), Vec::new());
+        for k in 0..=spans {
+            let (q, slope) = curve.at(range[0] + length * k as f64 / spans as f64);
+            points.push(development.position(q));
+            slopes.push(development.lift(q, slope * length));
+        }
+        let (basis, control) = (hermite::basis(spans)?, hermite::control(&points, &slopes));
+        let far = (0..4 * spans)
+            .map(|k| {
+                let local = basis.evaluate((k as f64 + 0.5) / (4 * spans) as f64);
+                let p: DVec3 =
+                    (0..local.count).map(|i| local.derivatives[0][i] * control[local.first + i]).sum();
+                development.shape.distance(p).abs()
+            })
+            .fold(0.0, f64::max);
+        if far <= tolerance || spans >= MOST_SPANS {
+            return Some((basis, control));
+        }
+        spans *= 2;
+    }
+}
