@@ -45,6 +45,7 @@ fn run(mesh: &str, labels: &str, method: &str, smoothed: Option<&str>) -> Result
                 iterations: Some(iterations),
                 detect_planes: false,
                 detect_holes: false,
+                detect_bosses: false,
                 ..Default::default()
             };
             part = topipe_smoothing::smooth(&part, &parameters, &Progress::silent())

@@ -73,6 +73,34 @@ fn free_surface(mesh: &TriangleMesh, part: &Part) -> String {
     )
 }
 
+/// Faces with two sides on the free surface, and vertices where a region or the free surface meets itself.
+fn borders(part: &Part) -> String {
+    let c = Connectivity::build(&part.mesh).expect("a manifold");
+    let region = |f: topipe_mesh::FaceId| part.region_of_face[f.index()].0;
+    let of_region = |f: &topipe_mesh::FaceId| region(*f) != u32::MAX;
+    let tongues = part
+        .mesh
+        .faces()
+        .filter(of_region)
+        .filter(|&f| (0..3).filter(|&k| region(c.neighbor(f, k)) == u32::MAX).count() >= 2)
+        .count();
+    let mut pinches = 0;
+    for v in part.mesh.vertices() {
+        let around: Vec<u32> = c.outgoing(v).map(|h| region(h.face())).collect();
+        let mut runs: Vec<u32> = Vec::new();
+        for k in 0..around.len() {
+            if around[k] != around[(k + 1) % around.len()] {
+                runs.push(around[k]);
+            }
+        }
+        let count = runs.len();
+        runs.sort_unstable();
+        runs.dedup();
+        pinches += usize::from(runs.len() < count);
+    }
+    format!("borders: {tongues} tongues, {pinches} pinches")
+}
+
 fn main() {
     let mut write = None;
     let mut parameters = Parameters::default();
@@ -133,15 +161,18 @@ fn case(path: &str, parameters: &Parameters, write: Option<&str>) {
                 region.area,
                 region.residual
             ),
-            RegionShape::Cylinder { point, axis, radius, .. } => println!(
-                "  hole d {:.6} axis {:.4} at {:.3}: {faces} faces, residual {:.1e}",
+            RegionShape::Cylinder { point, axis, radius, hole } => println!(
+                "  {} d {:.6} axis {:.4} at {:.3}: {faces} faces, {:.2} mm2, residual {:.1e}",
+                if hole { "hole" } else { "boss" },
                 2.0 * radius,
                 axis,
                 point,
+                region.area,
                 region.residual
             ),
         }
     }
+    println!("  {}", borders(&smoothed));
     let record = smoothed.smoothing.as_ref().expect("a record");
     let frozen = smoothed.frozen.iter().filter(|f| **f).count();
     println!(

@@ -80,6 +80,7 @@ fn main() {
                     tolerance: 0.0,
                     detect_planes: full,
                     detect_holes: full,
+                    detect_bosses: full,
                     preserve_volume: Some(full),
                     ..Parameters::default()
                 };

@@ -4,7 +4,7 @@
 //! of a fixed size and then added in order.
 
 use rayon::prelude::*;
-use topipe_mesh::DVec3;
+use topipe_mesh::{DVec3, RegionShape};
 
 /// Vertices per task: positions of one chunk (96 KiB) fit the second-level cache.
 pub(crate) const CHUNK: usize = 4096;
@@ -15,14 +15,14 @@ pub(crate) struct Domain {
     pub(crate) start: Vec<u32>,
     /// The vertices that pull, row after row.
     pub(crate) neighbors: Vec<u32>,
-    /// Vertices that may move in a plane only, in order.
+    /// Vertices that may move on a shape only, in order.
     pub(crate) slides: Vec<Slide>,
 }
 
-/// A vertex on the outline of a flat face: it moves in the plane through its first position.
+/// A vertex that moves on the shape of its region only: in the plane, or on the cylinder, through its first position.
 pub(crate) struct Slide {
     pub(crate) vertex: u32,
-    pub(crate) normal: DVec3,
+    pub(crate) shape: RegionShape,
 }
 
 impl Domain {
@@ -60,11 +60,20 @@ impl Domain {
         });
     }
 
-    /// Takes back what a step moved the sliding vertices out of their planes.
+    /// Takes back what a step moved the sliding vertices off their shapes.
     pub(crate) fn project(&self, original: &[DVec3], positions: &mut [DVec3]) {
         for slide in &self.slides {
             let v = slide.vertex as usize;
-            positions[v] -= slide.normal * slide.normal.dot(positions[v] - original[v]);
+            match slide.shape {
+                RegionShape::Plane { normal, .. } => {
+                    positions[v] -= normal * normal.dot(positions[v] - original[v]);
+                }
+                RegionShape::Cylinder { point, axis, .. } => {
+                    let radial = |p: DVec3| (p - point).reject_from_normalized(axis);
+                    let (wanted, here) = (radial(original[v]).length(), radial(positions[v]));
+                    positions[v] += here.normalize_or_zero() * wanted - here;
+                }
+            }
         }
     }
 }

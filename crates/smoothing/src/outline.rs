@@ -1,6 +1,6 @@
-//! Keeps the triangles of flat faces from turning over while their outlines slide.
+//! Keeps the triangles of regions from turning over while their outlines slide.
 //!
-//! The inside of a flat face is frozen, so an outline that straightens can pass a frozen vertex. On tetrahedral
+//! The inside of a region is frozen, so an outline that straightens can pass a frozen vertex. On tetrahedral
 //! results this did not happen once; on marching-cubes surfaces, whose flat faces have slivers along their outlines, it
 //! turned triangles over.
 
@@ -8,10 +8,10 @@ use crate::features::Features;
 use crate::kernel::Domain;
 use topipe_mesh::{DVec3, RegionShape, TriangleMesh};
 
-/// A triangle of a flat face may lose this much of its first area, not more.
+/// A triangle of a region may lose this much of its first area, not more.
 const LEAST_SHARE: f64 = 0.1;
 
-/// The triangles of flat faces with a sliding vertex.
+/// The triangles of regions with a sliding vertex.
 pub(crate) struct OutlineGuard {
     faces: Vec<Guarded>,
     slides: Vec<bool>,
@@ -36,12 +36,14 @@ impl OutlineGuard {
             if !region.is_some() || !vertices.iter().any(|&v| slides[v]) {
                 continue;
             }
-            if let RegionShape::Plane { normal, .. } = features.regions[region.index()].shape {
-                let area = normal.dot(mesh.area_vector(f));
-                // A sliver that is turned over from the start has nothing to lose.
-                if area > 0.0 {
-                    faces.push(Guarded { vertices, normal, least: LEAST_SHARE * area });
-                }
+            let area = mesh.area_vector(f);
+            let normal = match features.regions[region.index()].shape {
+                RegionShape::Plane { normal, .. } => normal,
+                RegionShape::Cylinder { .. } => area.normalize_or_zero(),
+            };
+            // A sliver that is turned over from the start has nothing to lose.
+            if normal.dot(area) > 0.0 {
+                faces.push(Guarded { vertices, normal, least: LEAST_SHARE * normal.dot(area) });
             }
         }
         Self { faces, slides }

@@ -108,16 +108,21 @@ pub struct Parameters {
     pub detect_planes: bool,
     /// Find round holes and freeze their walls and rims.
     pub detect_holes: bool,
+    /// Find bosses, the outsides of cylinders, and freeze them.
+    pub detect_bosses: bool,
     /// Let the outline of a flat face slide in its plane where it meets the free surface, instead of freezing its
     /// teeth.
     pub slide_outlines: bool,
     /// List the outline of flat faces among the feature edges where it is sharp. Off by default: an outline that the
     /// optimizer left is smooth after sliding, but where it runs is chance.
     pub outlines_as_features: bool,
-    /// Largest distance of a vertex from the plane of its flat face, in mean edge lengths.
-    pub plane_tolerance: f64,
-    /// Largest angle between a facet of a flat face and its plane, degrees.
-    pub plane_angle: f64,
+    /// Largest distance of a vertex from the plane of its flat face, in mean edge lengths. Unless set: four times the
+    /// mesh's own noise, which is the height over their neighbours that a tenth of the vertices stay below, but at
+    /// least 0.01 and at most 0.15. Each face then narrows it to what its own vertices deviate.
+    pub plane_tolerance: Option<f64>,
+    /// Largest angle between a facet of a flat face and its plane, degrees. Unless set: what `plane_tolerance` does to
+    /// a facet, at least 3.
+    pub plane_angle: Option<f64>,
     /// Smallest area of a flat face, in squared mean edge lengths (an equilateral triangle has 0.43). Keeps the steps
     /// of a voxel mesh and chance patches of the free surface from being frozen. On nine parts from optimization all
     /// flat faces of 5 or more were real; 10 leaves room.
@@ -144,10 +149,11 @@ impl Default for Parameters {
             freeze_non_design: true,
             detect_planes: true,
             detect_holes: true,
+            detect_bosses: true,
             slide_outlines: true,
             outlines_as_features: false,
-            plane_tolerance: 0.01,
-            plane_angle: 3.0,
+            plane_tolerance: None,
+            plane_angle: None,
             plane_area: 10.0,
             hole_tolerance: 0.05,
             sharp_angle: 30.0,
@@ -240,8 +246,8 @@ impl Parameters {
         )?;
         check(
             "plane_tolerance",
-            self.plane_tolerance,
-            self.plane_tolerance > 0.0 && self.plane_tolerance < 1.0,
+            self.plane_tolerance.unwrap_or(0.01),
+            self.plane_tolerance.is_none_or(|t| t > 0.0 && t < 1.0),
             "above 0 and below 1",
             length,
         )?;
@@ -254,8 +260,8 @@ impl Parameters {
         )?;
         check(
             "plane_angle",
-            self.plane_angle,
-            self.plane_angle > 0.0 && self.plane_angle <= 45.0,
+            self.plane_angle.unwrap_or(3.0),
+            self.plane_angle.is_none_or(|a| a > 0.0 && a <= 45.0),
             "above 0 and at most 45",
             "degrees between a facet and its plane",
         )?;

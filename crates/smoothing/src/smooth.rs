@@ -91,7 +91,7 @@ fn frozen(part: &Part, parameters: &Parameters, features: &Features) -> Vec<bool
         *frozen |= on_region;
     }
     if parameters.slide_outlines {
-        for slide in &features.outline {
+        for slide in &features.sliding {
             frozen[slide.vertex as usize] = part.frozen[slide.vertex as usize];
         }
     }
@@ -112,19 +112,22 @@ fn domain(connectivity: &Connectivity, features: &Features, frozen: &[bool], ver
     let mut start = Vec::with_capacity(vertices + 1);
     let mut neighbors = Vec::with_capacity(all.len());
     let mut slides = Vec::new();
-    let mut outline = features.outline.iter().peekable();
+    let mut sliding = features.sliding.iter().peekable();
     start.push(0);
     for v in 0..vertices {
-        let slide = outline.next_if(|o| o.vertex as usize == v);
+        let slide = sliding.next_if(|s| s.vertex as usize == v);
         if !frozen[v] {
+            let ring = all[all_start[v] as usize..all_start[v + 1] as usize].iter().map(|n| n.0);
             match slide {
-                // Along the outline only: its other neighbours would draw it to one side.
-                Some(o) if features.on_region[v] => {
-                    neighbors.extend(o.along);
-                    slides.push(Slide { vertex: o.vertex, normal: o.normal });
+                Some(s) => {
+                    match s.along {
+                        // Along the outline only: its other neighbours would draw it to one side.
+                        Some(along) => neighbors.extend(along),
+                        None => neighbors.extend(ring),
+                    }
+                    slides.push(Slide { vertex: s.vertex, shape: features.regions[s.region.index()].shape });
                 }
-                _ => neighbors
-                    .extend(all[all_start[v] as usize..all_start[v + 1] as usize].iter().map(|n| n.0)),
+                None => neighbors.extend(ring),
             }
         }
         start.push(neighbors.len() as u32);

@@ -1,6 +1,6 @@
 //! How each kind of artifact is drawn.
 
-use topipe_mesh::{DVec3, Part, TriangleMesh};
+use topipe_mesh::{Connectivity, DVec3, Part, TriangleMesh};
 use topipe_quad_matching::QuadLayout;
 use topipe_render::{
     Camera, Color, Coloring, Image, LineLayer, LineWidth, MeshLayer, Options, RenderError, Scene, palette,
@@ -27,9 +27,25 @@ const CHORD: f64 = 2e-4;
 /// Radius of a drawn skeleton over its diagonal.
 const TUBE: f64 = 0.004;
 
-/// A mesh, lit.
+/// A mesh, lit; a color for each region of known shape, and their borders.
 pub(crate) fn mesh(part: &Part, view: &View) -> Result<Image, RenderError> {
-    render(Scene::default().add_mesh(MeshLayer::new(&part.mesh)), &view.camera, &view.options)
+    if part.regions.is_empty() {
+        return render(Scene::default().add_mesh(MeshLayer::new(&part.mesh)), &view.camera, &view.options);
+    }
+    let regions: Vec<u32> = part.region_of_face.iter().map(|region| region.0).collect();
+    let mut borders = Vec::new();
+    if let Ok(connectivity) = Connectivity::build(&part.mesh) {
+        for h in connectivity.edges() {
+            let twin = connectivity.twin(h);
+            if twin.is_some() && regions[h.face().index()] != regions[twin.face().index()] {
+                let ends = [connectivity.origin(h), connectivity.target(h)];
+                borders.push(ends.map(|v| part.mesh.position(v)).to_vec());
+            }
+        }
+    }
+    let mut scene = Scene::default();
+    scene.add_mesh(by_id(&part.mesh, &regions)).add_lines(lines(borders));
+    render(&scene, &view.camera, &view.options)
 }
 
 /// A mesh with a color for each tile.

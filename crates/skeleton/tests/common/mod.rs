@@ -128,6 +128,7 @@ pub(crate) fn fixture(case: &str) -> Part {
             iterations: Some(iterations),
             detect_planes: false,
             detect_holes: false,
+            detect_bosses: false,
             ..Default::default()
         };
         part = topipe_smoothing::smooth(&part, &parameters, &Progress::silent()).unwrap();

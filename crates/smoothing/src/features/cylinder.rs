@@ -1,14 +1,18 @@
-//! Round holes of any orientation: rings of facets that lie on a cylinder and face its axis.
+//! Cylinders in any direction: holes, bosses, and arcs of either.
 //!
-//! A patch of three rings around each facet that lies in a hollow gives an axis (the direction in which its normals
+//! A patch of three rings around each facet that bends to one side gives an axis (the direction in which its normals
 //! vary least) and a circle. Gauss-Newton on the vertices, which lie on the cylinder even where the facets are
-//! coarse chords, makes both exact. The region then grows over all facets with vertices on the cylinder and is a hole
-//! if one of its borders runs once around the axis.
+//! coarse chords, makes both exact. The region then grows over all facets with vertices on the cylinder, with a
+//! tolerance that narrows to what these vertices themselves deviate.
+//!
+//! A wall that runs all around is accepted as it is. An arc of one must lie on the cylinder to rounding and be seen in
+//! at least five places around it: any three parallel lines lie on one, and the four edges of two equal chamfers do.
 
 use super::border_half_edges;
 use super::fit::{Cylinder, Symmetric};
+use super::noise::{Tolerance, is_systematic};
 use rayon::prelude::*;
-use topipe_mesh::{Connectivity, DVec3, FaceId, Region, RegionShape, TriangleMesh, VertexId};
+use topipe_mesh::{Connectivity, DVec3, FaceId, RegionShape, TriangleMesh, VertexId};
 use topipe_progress::{Interrupted, Progress};
 
 /// Two facets belong to one wall when their normals differ by less: a six-sided hole has 60 degrees.
@@ -24,59 +28,91 @@ const FEWEST_FACES: usize = 12;
 /// patch, not the whole ring.
 const FIRST_TOLERANCE: f64 = 0.2;
 
+/// Fewest places around the axis, apart from each other, at which an arc has vertices.
+const FEWEST_PLACES: usize = 5;
+
+/// Places around the axis nearer than this many edge lengths are one.
+const ONE_PLACE: f64 = 0.1;
+
+/// Spread of the distances of a wall's vertices, in median absolute deviations, that still belong to it.
+const OUTLIER: f64 = 5.0 * 1.4826;
+
+/// A cylinder that was found.
+pub(super) struct Wall {
+    pub(super) shape: RegionShape,
+    pub(super) faces: Vec<FaceId>,
+    /// True when it runs all around its axis.
+    pub(super) closed: bool,
+}
+
 struct Candidate {
     score: f64,
     seed: FaceId,
     cylinder: Cylinder,
     edge: f64,
+    hollow: bool,
 }
 
-/// All holes, those with most faces first, with the faces of their walls; area and residual are left to measure.
-pub(super) fn holes(
+struct Search<'a> {
+    mesh: &'a TriangleMesh,
+    connectivity: &'a Connectivity,
+    normals: Vec<DVec3>,
+    taken: Vec<bool>,
+    tolerance: f64,
+    rounding: f64,
+    largest: f64,
+}
+
+/// All cylinders, the best fitting first, with the faces of their walls.
+///
+/// Borders are as chance left them; see [`super::borders`].
+pub(super) fn cylinders(
     mesh: &TriangleMesh,
     connectivity: &Connectivity,
-    mut taken: Vec<bool>,
+    taken: Vec<bool>,
     tolerance: f64,
+    exact: Tolerance,
     progress: &Progress,
-) -> Result<Vec<(Region, Vec<FaceId>)>, Interrupted> {
-    let normals: Vec<DVec3> = mesh.faces().map(|f| mesh.normal(f)).collect();
-    let largest = mesh.diagonal() / 2.0;
+) -> Result<Vec<Wall>, Interrupted> {
+    let mut search = Search {
+        mesh,
+        connectivity,
+        normals: mesh.faces().map(|f| mesh.normal(f)).collect(),
+        taken,
+        tolerance,
+        rounding: exact.rounding,
+        largest: mesh.diagonal() / 2.0,
+    };
     progress.check()?;
-    let mut candidates: Vec<Candidate> = (0..mesh.face_count())
-        .into_par_iter()
-        .filter_map(|f| candidate(mesh, connectivity, &normals, &taken, FaceId::new(f), largest))
-        .collect();
+    let mut candidates: Vec<Candidate> =
+        (0..mesh.face_count()).into_par_iter().filter_map(|f| search.candidate(FaceId::new(f))).collect();
     candidates.sort_by(|a, b| a.score.total_cmp(&b.score).then(a.seed.cmp(&b.seed)));
     let mut found = Vec::new();
-    // Faces of rings that were grown and refused; most candidates of one false ring are neighbours.
+    // Faces of walls that were grown and refused; most candidates of one false wall are neighbours.
     let mut refused = vec![false; mesh.face_count()];
     let mut inside = vec![false; mesh.face_count()];
     for (k, candidate) in candidates.iter().enumerate() {
         if k % 64 == 0 {
             progress.check()?;
         }
-        if taken[candidate.seed.index()] || refused[candidate.seed.index()] {
+        if search.taken[candidate.seed.index()] || refused[candidate.seed.index()] {
             continue;
         }
-        let grown = grow(mesh, connectivity, &normals, &taken, candidate, tolerance, &mut inside);
-        let Some((cylinder, faces)) = grown else { continue };
-        if !is_ring(mesh, connectivity, &cylinder, &faces) {
-            for f in &faces {
-                refused[f.index()] = true;
-            }
-            continue;
-        }
+        let Some((cylinder, faces)) = search.grow(candidate, &mut inside) else { continue };
+        let closed = search.judge(&cylinder, &faces, candidate.edge);
+        let marks = if closed.is_some() { &mut search.taken } else { &mut refused };
         for f in &faces {
-            taken[f.index()] = true;
+            marks[f.index()] = true;
         }
-        found.push((region(mesh, cylinder, &faces), faces));
+        if let Some(closed) = closed {
+            found.push(Wall { shape: shape(mesh, cylinder, &faces, candidate.hollow), faces, closed });
+        }
     }
-    // By number of faces: unlike areas, counts are the same after a rotation.
-    found.sort_by(|a, b| b.1.len().cmp(&a.1.len()).then(a.1[0].cmp(&b.1[0])));
     Ok(found)
 }
 
-fn region(mesh: &TriangleMesh, cylinder: Cylinder, faces: &[FaceId]) -> Region {
+/// The cylinder with a point and a sign of the axis that do not depend on how it was found.
+pub(super) fn shape(mesh: &TriangleMesh, cylinder: Cylinder, faces: &[FaceId], hole: bool) -> RegionShape {
     let mut area = 0.0;
     let mut centroid = DVec3::ZERO;
     for &f in faces {
@@ -91,174 +127,210 @@ fn region(mesh: &TriangleMesh, cylinder: Cylinder, faces: &[FaceId]) -> Region {
     let lead =
         axis.to_array().into_iter().fold(0.0, |a: f64, b| if b.abs() > a.abs() + 1e-9 { b } else { a });
     let axis = if lead < 0.0 { -axis } else { axis };
-    let shape = RegionShape::Cylinder { point, axis, radius: cylinder.radius, hole: true };
-    Region { shape, area: 0.0, residual: 0.0 }
+    RegionShape::Cylinder { point, axis, radius: cylinder.radius, hole }
 }
 
-/// Fits a cylinder to the patch around `seed`, if it lies in a hollow.
-fn candidate(
-    mesh: &TriangleMesh,
-    connectivity: &Connectivity,
-    normals: &[DVec3],
-    taken: &[bool],
-    seed: FaceId,
-    largest: f64,
-) -> Option<Candidate> {
-    if taken[seed.index()] || !is_hollow(mesh, connectivity, normals, seed) {
-        return None;
-    }
-    let mut patch = vec![seed];
-    let mut first = 0;
-    for _ in 0..3 {
-        let last = patch.len();
-        for i in first..last {
-            let face = patch[i];
-            for k in 0..3 {
-                let across = connectivity.neighbor(face, k);
-                if across.is_some()
-                    && !taken[across.index()]
-                    && normals[across.index()].dot(normals[face.index()]) > WALL_COSINE
-                    && !patch.contains(&across)
-                {
-                    patch.push(across);
-                }
-            }
-        }
-        first = last;
-    }
-    if patch.len() < 6 {
-        return None;
-    }
-    let mut moments = Symmetric::default();
-    let (mut weight, mut length) = (0.0, 0.0);
-    let mut vertices: Vec<VertexId> = Vec::with_capacity(3 * patch.len());
-    for &f in &patch {
-        let area = mesh.area_vector(f).length();
-        moments.add(normals[f.index()], area);
-        weight += area;
-        let [a, b, c] = mesh.corners(f);
-        length += a.distance(b) + b.distance(c) + c.distance(a);
-        vertices.extend(mesh.triangles[f.index()]);
-    }
+/// The distinct vertices of some faces.
+pub(super) fn points(mesh: &TriangleMesh, faces: &[FaceId]) -> Vec<DVec3> {
+    let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| mesh.triangles[f.index()]).collect();
     vertices.sort_unstable();
     vertices.dedup();
-    let points: Vec<DVec3> = vertices.iter().map(|&v| mesh.position(v)).collect();
-    let edge = length / (3 * patch.len()) as f64;
-    let (values, vectors) = moments.eigen();
-    // Flat (all normals alike) or curved in all directions: no cylinder.
-    if values[1] < 0.005 * weight || values[0] > 0.12 * weight {
-        return None;
-    }
-    let rough = Cylinder::along(vectors[0], &points)?;
-    // Nearly all patches of a noisy surface end here, before the costly part.
-    if rough.misfit(&points) > 2.0 * FIRST_TOLERANCE * edge {
-        return None;
-    }
-    let cylinder = rough.refine(&points, 5)?;
-    if cylinder.radius > largest {
-        return None;
-    }
-    let score = cylinder.misfit(&points) / edge;
-    let inward: f64 = patch.iter().map(|&f| mesh.area_vector(f).dot(cylinder.radial(mesh.centroid(f)))).sum();
-    (score < FIRST_TOLERANCE && inward < 0.0).then_some(Candidate { score, seed, cylinder, edge })
+    vertices.iter().map(|&v| mesh.position(v)).collect()
 }
 
-/// True when a neighbour lies on the outer side of the facet and none of the same wall on the inner side.
-fn is_hollow(mesh: &TriangleMesh, connectivity: &Connectivity, normals: &[DVec3], face: FaceId) -> bool {
-    let (normal, here) = (normals[face.index()], mesh.centroid(face));
-    let mut hollow = false;
-    for k in 0..3 {
-        let across = connectivity.neighbor(face, k);
-        if !across.is_some() || normals[across.index()].dot(normal) <= WALL_COSINE {
-            continue;
-        }
-        let there = mesh.centroid(across) - here;
-        let height = normal.dot(there);
-        let distance = there.length();
-        if height < -0.02 * distance {
-            return false;
-        }
-        hollow |= height > 0.02 * distance;
-    }
-    hollow
-}
-
-/// Grows from the seed over facets with all vertices on the cylinder, refits, and repeats until nothing changes.
-///
-/// `inside` is all false before and after: clearing what was set costs the size of the wall, not of the mesh.
-fn grow(
-    mesh: &TriangleMesh,
-    connectivity: &Connectivity,
-    normals: &[DVec3],
-    taken: &[bool],
-    candidate: &Candidate,
-    tolerance: f64,
-    inside: &mut [bool],
-) -> Option<(Cylinder, Vec<FaceId>)> {
-    let mut cylinder = candidate.cylinder;
-    let mut faces: Vec<FaceId> = Vec::new();
-    let mut share = FIRST_TOLERANCE.max(tolerance);
-    for _ in 0..16 {
-        let limit = share * candidate.edge;
-        let fits = |f: FaceId| {
-            let radial = cylinder.radial(mesh.centroid(f)).normalize_or_zero();
-            !taken[f.index()]
-                && normals[f.index()].dot(radial) < -WALL_COSINE
-                && mesh.corners(f).iter().all(|&p| cylinder.distance(p).abs() <= limit)
-        };
-        if !fits(candidate.seed) {
+impl Search<'_> {
+    /// Fits a cylinder to the patch around `seed`, if it bends to one side.
+    fn candidate(&self, seed: FaceId) -> Option<Candidate> {
+        if self.taken[seed.index()] {
             return None;
         }
-        let before = faces.len();
-        faces.clear();
-        faces.push(candidate.seed);
-        inside[candidate.seed.index()] = true;
-        let mut next = 0;
-        while next < faces.len() {
-            for k in 0..3 {
-                let across = connectivity.neighbor(faces[next], k);
-                if across.is_some() && !inside[across.index()] && fits(across) {
-                    inside[across.index()] = true;
-                    faces.push(across);
+        let hollow = self.bends(seed)?;
+        let mut patch = vec![seed];
+        let mut first = 0;
+        for _ in 0..3 {
+            let last = patch.len();
+            for i in first..last {
+                let face = patch[i];
+                for k in 0..3 {
+                    let across = self.connectivity.neighbor(face, k);
+                    if across.is_some()
+                        && !self.taken[across.index()]
+                        && self.normals[across.index()].dot(self.normals[face.index()]) > WALL_COSINE
+                        && !patch.contains(&across)
+                    {
+                        patch.push(across);
+                    }
                 }
             }
-            next += 1;
+            first = last;
         }
-        for f in &faces {
-            inside[f.index()] = false;
-        }
-        if faces.len() < FEWEST_FACES {
+        if patch.len() < 6 {
             return None;
         }
-        let settled = share <= tolerance && faces.len() == before;
-        share = (share / 2.0).max(tolerance);
-        let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| mesh.triangles[f.index()]).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        let points: Vec<DVec3> = vertices.iter().map(|&v| mesh.position(v)).collect();
-        cylinder = cylinder.refine(&points, 20)?;
-        if settled {
-            break;
+        let mut moments = Symmetric::default();
+        let (mut weight, mut length) = (0.0, 0.0);
+        for &f in &patch {
+            let area = self.mesh.area_vector(f).length();
+            moments.add(self.normals[f.index()], area);
+            weight += area;
+            let [a, b, c] = self.mesh.corners(f);
+            length += a.distance(b) + b.distance(c) + c.distance(a);
         }
+        let edge = length / (3 * patch.len()) as f64;
+        let (values, vectors) = moments.eigen();
+        // Flat (all normals alike) or curved in all directions: no cylinder.
+        if values[1] < 1e-4 * weight || values[0] > 0.12 * weight || values[0] > 0.5 * values[1] {
+            return None;
+        }
+        let points = points(self.mesh, &patch);
+        let rough = Cylinder::along(vectors[0], &points)?;
+        // Nearly all patches of a noisy surface end here, before the costly part.
+        if rough.misfit(&points) > 2.0 * FIRST_TOLERANCE * edge {
+            return None;
+        }
+        let cylinder = rough.refine(&points, 5)?;
+        if cylinder.radius > self.largest {
+            return None;
+        }
+        let score = cylinder.misfit(&points) / edge;
+        let outward: f64 =
+            patch.iter().map(|&f| self.mesh.area_vector(f).dot(cylinder.radial(self.mesh.centroid(f)))).sum();
+        (score < FIRST_TOLERANCE && (outward < 0.0) == hollow).then_some(Candidate {
+            score,
+            seed,
+            cylinder,
+            edge,
+            hollow,
+        })
     }
-    faces.sort_unstable();
-    Some((cylinder, faces))
+
+    /// Whether the neighbours of the same wall lie on the outer side of the facet (`true`: a hollow) or on the inner
+    /// side; `None` when they lie on both, or in its plane.
+    fn bends(&self, face: FaceId) -> Option<bool> {
+        let (normal, here) = (self.normals[face.index()], self.mesh.centroid(face));
+        let (mut up, mut down) = (false, false);
+        for k in 0..3 {
+            let across = self.connectivity.neighbor(face, k);
+            if !across.is_some() || self.normals[across.index()].dot(normal) <= WALL_COSINE {
+                continue;
+            }
+            let there = self.mesh.centroid(across) - here;
+            let height = normal.dot(there);
+            let flat = 2e-3 * there.length();
+            up |= height > flat;
+            down |= height < -flat;
+        }
+        (up != down).then_some(up)
+    }
+
+    /// Grows from the seed over facets with all vertices on the cylinder, refits, and repeats until nothing changes.
+    ///
+    /// `inside` is all false before and after: clearing what was set costs the size of the wall, not of the mesh.
+    fn grow(&self, candidate: &Candidate, inside: &mut [bool]) -> Option<(Cylinder, Vec<FaceId>)> {
+        let mut cylinder = candidate.cylinder;
+        let side = if candidate.hollow { -1.0 } else { 1.0 };
+        let mut faces: Vec<FaceId> = Vec::new();
+        let mut limit = FIRST_TOLERANCE.max(self.tolerance) * candidate.edge;
+        let narrowest = self.tolerance * candidate.edge;
+        let mut narrowed = false;
+        for _ in 0..20 {
+            let fits = |f: FaceId| {
+                let radial = cylinder.radial(self.mesh.centroid(f)).normalize_or_zero();
+                !self.taken[f.index()]
+                    && side * self.normals[f.index()].dot(radial) > WALL_COSINE
+                    && self.mesh.corners(f).iter().all(|&p| cylinder.distance(p).abs() <= limit)
+            };
+            if !fits(candidate.seed) {
+                return None;
+            }
+            let before = faces.len();
+            faces.clear();
+            faces.push(candidate.seed);
+            inside[candidate.seed.index()] = true;
+            let mut next = 0;
+            while next < faces.len() {
+                for k in 0..3 {
+                    let across = self.connectivity.neighbor(faces[next], k);
+                    if across.is_some() && !inside[across.index()] && fits(across) {
+                        inside[across.index()] = true;
+                        faces.push(across);
+                    }
+                }
+                next += 1;
+            }
+            for f in &faces {
+                inside[f.index()] = false;
+            }
+            if faces.len() < FEWEST_FACES {
+                return None;
+            }
+            let points = points(self.mesh, &faces);
+            cylinder = cylinder.refine(&points, 20)?;
+            let settled = faces.len() == before;
+            if narrowed && settled {
+                break;
+            }
+            if limit <= narrowest {
+                let mut distances: Vec<f64> = points.iter().map(|&p| cylinder.distance(p).abs()).collect();
+                let middle = distances.len() / 2;
+                let median = *distances.select_nth_unstable_by(middle, f64::total_cmp).1;
+                limit = (OUTLIER * median).clamp(self.rounding.min(narrowest), narrowest);
+                narrowed = true;
+            } else {
+                limit = (limit / 2.0).max(narrowest);
+            }
+        }
+        faces.sort_unstable();
+        Some((cylinder, faces))
+    }
+
+    /// `Some(true)` for a wall all around, `Some(false)` for an arc that is exact, `None` for what is no cylinder.
+    fn judge(&self, cylinder: &Cylinder, faces: &[FaceId], edge: f64) -> Option<bool> {
+        let (u, v) = cylinder.axis.any_orthonormal_pair();
+        let points = points(self.mesh, faces);
+        let rms = cylinder.misfit(&points);
+        let angle = |p: DVec3| {
+            let d = cylinder.radial(p);
+            d.dot(v).atan2(d.dot(u))
+        };
+        let mut angles: Vec<f64> = points.iter().map(|&p| angle(p)).collect();
+        angles.sort_by(f64::total_cmp);
+        let around = angles[0] + std::f64::consts::TAU - angles[angles.len() - 1];
+        let widest = angles.windows(2).map(|w| w[1] - w[0]).fold(around, f64::max);
+        if widest > WIDEST_GAP.to_radians() || !winds(self.mesh, self.connectivity, faces, angle) {
+            let places =
+                1 + angles.windows(2).filter(|w| (w[1] - w[0]) * cylinder.radius > ONE_PLACE * edge).count();
+            return (places >= FEWEST_PLACES && rms <= self.rounding).then_some(false);
+        }
+        // A cone, a barrel, an oval: the radius follows the height or the angle.
+        if rms <= self.rounding {
+            return Some(true);
+        }
+        let height = |p: DVec3| cylinder.axis.dot(p - cylinder.point);
+        let (low, high) = points
+            .iter()
+            .map(|&p| height(p))
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
+        let samples = |second: fn(f64) -> f64| -> Vec<[f64; 3]> {
+            points
+                .iter()
+                .map(|&p| {
+                    let t = 2.0 * (height(p) - low) / (high - low).max(f64::MIN_POSITIVE) - 1.0;
+                    [t, second(2.0 * angle(p)), cylinder.distance(p)]
+                })
+                .collect()
+        };
+        (!is_systematic(&samples(f64::cos)) && !is_systematic(&samples(f64::sin))).then_some(true)
+    }
 }
 
-/// True when the wall goes all around: no wide gap between its vertices, and a border that winds once about the axis.
-fn is_ring(mesh: &TriangleMesh, connectivity: &Connectivity, cylinder: &Cylinder, faces: &[FaceId]) -> bool {
-    let (u, v) = cylinder.axis.any_orthonormal_pair();
-    let angle = |p: DVec3| {
-        let d = cylinder.radial(p);
-        d.dot(v).atan2(d.dot(u))
-    };
-    let mut angles: Vec<f64> = faces.iter().flat_map(|&f| mesh.corners(f)).map(angle).collect();
-    angles.sort_by(f64::total_cmp);
-    let around = angles[0] + std::f64::consts::TAU - angles[angles.len() - 1];
-    let widest = angles.windows(2).map(|w| w[1] - w[0]).fold(around, f64::max);
-    if widest > WIDEST_GAP.to_radians() {
-        return false;
-    }
+/// True when a border of the faces runs once around the axis.
+fn winds(
+    mesh: &TriangleMesh,
+    connectivity: &Connectivity,
+    faces: &[FaceId],
+    angle: impl Fn(DVec3) -> f64,
+) -> bool {
     let inside = |f: FaceId| faces.binary_search(&f).is_ok();
     let border = border_half_edges(connectivity, faces, inside);
     let mut seen = std::collections::BTreeSet::new();

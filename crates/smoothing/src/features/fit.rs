@@ -1,6 +1,6 @@
 //! Small dense fits: eigenvectors of symmetric 3 x 3 matrices, circles, cylinders.
 
-use topipe_mesh::DVec3;
+use topipe_mesh::{DVec3, FaceId, TriangleMesh};
 
 /// A symmetric 3 x 3 matrix: xx, yy, zz, xy, xz, yz.
 #[derive(Debug, Clone, Copy, Default)]
@@ -53,7 +53,7 @@ impl Symmetric {
 }
 
 /// Solves `m x = b` by elimination with pivoting; `None` when `m` is singular.
-fn solve<const N: usize>(mut m: [[f64; N]; N], mut b: [f64; N]) -> Option<[f64; N]> {
+pub(super) fn solve<const N: usize>(mut m: [[f64; N]; N], mut b: [f64; N]) -> Option<[f64; N]> {
     for k in 0..N {
         let pivot = (k..N).max_by(|&i, &j| m[i][k].abs().total_cmp(&m[j][k].abs()))?;
         if m[pivot][k].abs() < 1e-14 {
@@ -76,6 +76,32 @@ fn solve<const N: usize>(mut m: [[f64; N]; N], mut b: [f64; N]) -> Option<[f64; 
         b[k] /= m[k][k];
     }
     b.iter().all(|x| x.is_finite()).then_some(b)
+}
+
+/// A point and the unit normal of the plane of least squares through faces: through their vertices, weighted by area.
+/// `None` for faces without area.
+pub(super) fn plane(mesh: &TriangleMesh, faces: &[FaceId]) -> Option<(DVec3, DVec3)> {
+    let (mut direction, mut point, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+    for &f in faces {
+        let area = mesh.area_vector(f);
+        direction += area;
+        point += area.length() * mesh.centroid(f);
+        weight += area.length();
+    }
+    if weight <= 0.0 {
+        return None;
+    }
+    point /= weight;
+    let scale = weight.sqrt();
+    let mut moments = Symmetric::default();
+    for &f in faces {
+        let area = mesh.area_vector(f).length();
+        for p in mesh.corners(f) {
+            moments.add((p - point) / scale, area / weight);
+        }
+    }
+    let normal = moments.eigen().1[0];
+    Some((point, if normal.dot(direction) < 0.0 { -normal } else { normal }))
 }
 
 /// A circular cylinder without ends.

@@ -10,9 +10,11 @@
 //! and follow sharp edges around holes that are perpendicular to a face. Those here find faces and holes in any
 //! orientation, and freeze the wall of a hole together with its rims.
 
+mod borders;
 mod cylinder;
 mod edges;
 mod fit;
+mod noise;
 mod plane;
 
 use crate::{Method, Parameters, SmoothingError};
@@ -32,19 +34,20 @@ pub struct Features {
     pub region_of_face: Vec<RegionId>,
     /// One per vertex: true on a face of a region.
     pub on_region: Vec<bool>,
-    /// Where the outline of a flat face is ragged: vertices that may slide in their plane, in order.
-    pub outline: Vec<OutlineVertex>,
+    /// Vertices that may slide on their region: its outline against the free surface, which is ragged, and the
+    /// vertices next to it; in order.
+    pub sliding: Vec<SlidingVertex>,
 }
 
-/// A vertex on the border between one flat face and the free surface.
+/// A vertex that may move on the shape of its region.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OutlineVertex {
+pub struct SlidingVertex {
     /// The vertex.
     pub vertex: u32,
-    /// Its neighbours along the outline.
-    pub along: [u32; 2],
-    /// Unit normal of the plane.
-    pub normal: DVec3,
+    /// The region all its faces of known shape belong to.
+    pub region: RegionId,
+    /// On the outline: its neighbours along it.
+    pub along: Option<[u32; 2]>,
 }
 
 /// Finds the flat faces and the holes of `part`, as far as `parameters` ask for them.
@@ -64,24 +67,134 @@ pub fn detect(
             regions: Vec::new(),
             region_of_face: vec![RegionId::NONE; mesh.face_count()],
             on_region: vec![false; mesh.vertex_count()],
-            outline: Vec::new(),
+            sliding: Vec::new(),
         });
     }
-    let mut regions = part.regions.clone();
-    let mut region_of_face = part.region_of_face.clone();
-    if parameters.detect_holes {
-        let taken: Vec<bool> = region_of_face.iter().map(|r| r.is_some()).collect();
-        for (region, faces) in
-            cylinder::holes(mesh, connectivity, taken, parameters.hole_tolerance, progress)?
-        {
-            add(&mut regions, &mut region_of_face, region, &faces);
+    let tolerance = noise::tolerance(mesh, connectivity, parameters);
+    // The regions a part comes with stay as they are: what follows looks at the other faces.
+    let given = part.regions.len() as u32;
+    let mut shapes: Vec<RegionShape> = part.regions.iter().map(|r| r.shape).collect();
+    let size = SizeRule::new(mesh, parameters);
+    let mut least: Vec<LeastArea> = vec![size.any; shapes.len()];
+    let mut owner: Vec<u32> = part.region_of_face.iter().map(|r| r.0).collect();
+    let mut claim = |shape, faces: &[FaceId], area, owner: &mut [u32]| {
+        faces.iter().for_each(|f| owner[f.index()] = shapes.len() as u32);
+        shapes.push(shape);
+        least.push(area);
+    };
+    let taken = |owner: &[u32]| -> Vec<bool> { owner.iter().map(|&o| o != borders::NONE).collect() };
+    if parameters.detect_holes || parameters.detect_bosses {
+        let narrow = parameters.hole_tolerance;
+        for wall in cylinder::cylinders(mesh, connectivity, taken(&owner), narrow, tolerance, progress)? {
+            let hole = matches!(wall.shape, RegionShape::Cylinder { hole: true, .. });
+            if if hole { parameters.detect_holes } else { parameters.detect_bosses } {
+                let area = if wall.closed { size.any } else { size.arc };
+                claim(wall.shape, &wall.faces, area, &mut owner);
+            }
         }
     }
     if parameters.detect_planes {
-        let taken: Vec<bool> = region_of_face.iter().map(|r| r.is_some()).collect();
-        for (region, faces) in plane::planes(mesh, connectivity, taken, parameters, progress)? {
-            add(&mut regions, &mut region_of_face, region, &faces);
+        let smallest = size.plane.enclosed;
+        for (shape, faces) in plane::planes(mesh, connectivity, taken(&owner), tolerance, smallest, progress)?
+        {
+            claim(shape, &faces, size.plane, &mut owner);
         }
+    }
+    let origin = borders::clean(mesh, connectivity, &mut owner, given, |piece| {
+        least[piece.region as usize].accepts(piece)
+    });
+    let features = assemble(part, connectivity, parameters, &shapes, &owner, &origin, given);
+    Ok(features)
+}
+
+/// The smallest area of a region, mm^2.
+#[derive(Debug, Clone, Copy)]
+struct LeastArea {
+    /// Amid the free surface.
+    alone: f64,
+    /// Where most of its border is shared with other regions.
+    enclosed: f64,
+}
+
+impl LeastArea {
+    fn accepts(self, piece: &borders::Piece) -> bool {
+        piece.area >= self.alone
+            || (piece.area >= self.enclosed && piece.shared >= ENCLOSED_SHARE * piece.border)
+    }
+}
+
+/// Which pieces of a shape are large enough to be a region.
+struct SizeRule {
+    plane: LeastArea,
+    arc: LeastArea,
+    any: LeastArea,
+}
+
+/// Of the border of a piece that counts as enclosed by other regions.
+const ENCLOSED_SHARE: f64 = 0.5;
+
+/// The part of `plane_area` that is asked of an enclosed piece: the strip between a boss and the oblique side it
+/// stands on is half an element wide, and still a face of the design.
+const ENCLOSED_AREA: f64 = 0.2;
+
+/// The multiple of `plane_area` that is asked of an arc of a cylinder: five freedoms of a shape instead of three. On
+/// the reference parts smaller arcs are real, but one or two facets wide.
+const ARC_AREA: f64 = 2.0;
+
+/// A flat face of less than `plane_area` is accepted when it is this share of the whole surface: a coarse CAD box has
+/// twelve facets.
+const LARGE_SHARE: f64 = 0.05;
+
+/// Nothing smaller than this share of the surface is a region, however fine the mesh: the nine parts' smallest known
+/// face that an engineer would name has 1.4e-3.
+const LEAST_SHARE: f64 = 1e-4;
+
+impl SizeRule {
+    fn new(mesh: &TriangleMesh, parameters: &Parameters) -> Self {
+        let (edge, area) = (mesh.mean_edge_length(), mesh.area());
+        let least = |factor: f64| {
+            (factor * parameters.plane_area * edge * edge).max(LEAST_SHARE * area).min(LARGE_SHARE * area)
+        };
+        Self {
+            plane: LeastArea { alone: least(1.0), enclosed: least(ENCLOSED_AREA) },
+            arc: LeastArea { alone: least(ARC_AREA), enclosed: least(ARC_AREA) },
+            any: LeastArea { alone: 0.0, enclosed: 0.0 },
+        }
+    }
+}
+
+/// Turns pieces into regions: given ones first, then cylinders, then planes, those with more faces first.
+fn assemble(
+    part: &Part,
+    connectivity: &Connectivity,
+    parameters: &Parameters,
+    shapes: &[RegionShape],
+    owner: &[u32],
+    origin: &[u32],
+    given: u32,
+) -> Features {
+    let mesh = &part.mesh;
+    let mut faces = vec![Vec::new(); origin.len()];
+    for f in mesh.faces().filter(|f| owner[f.index()] != borders::NONE) {
+        faces[owner[f.index()] as usize].push(f);
+    }
+    let mut order: Vec<usize> = (0..origin.len()).collect();
+    // By number of faces: unlike areas, counts are the same after a rotation.
+    order.sort_by_key(|&p| {
+        let rank = if origin[p] < given { origin[p] } else { given };
+        let plane = matches!(shapes[origin[p] as usize], RegionShape::Plane { .. });
+        (rank, plane, std::cmp::Reverse(faces[p].len()), faces[p].first().copied())
+    });
+    let mut regions = Vec::new();
+    let mut region_of_face = vec![RegionId::NONE; mesh.face_count()];
+    let (kept, new) = order.split_at(given as usize);
+    let kept = kept.iter().map(|&p| (p, shapes[origin[p] as usize]));
+    let new =
+        joint_shapes(mesh, new.iter().map(|&p| (p, shapes[origin[p] as usize], &faces[p][..])).collect());
+    for (p, shape) in kept.chain(new) {
+        let id = RegionId::new(regions.len());
+        faces[p].iter().for_each(|f| region_of_face[f.index()] = id);
+        regions.push(Region { shape, area: 0.0, residual: 0.0 });
     }
     let mut on_region = vec![false; mesh.vertex_count()];
     for f in mesh.faces() {
@@ -91,18 +204,74 @@ pub fn detect(
             }
         }
     }
-    let outline = outline(part, connectivity, parameters, &regions, &region_of_face);
-    let mut features = Features { regions, region_of_face, on_region, outline };
+    let sliding = sliding(part, connectivity, parameters, &region_of_face);
+    let mut features = Features { regions, region_of_face, on_region, sliding };
     features.measure(mesh);
-    Ok(features)
+    features
 }
 
-fn add(regions: &mut Vec<Region>, region_of_face: &mut [RegionId], region: Region, faces: &[FaceId]) {
-    let id = RegionId::new(regions.len());
-    regions.push(region);
-    for f in faces {
-        region_of_face[f.index()] = id;
+/// Fits pieces, and fits those together that are pieces of one shape: the flats of a notched plate share a plane to
+/// the last bit, and short arcs get the radius of the long ones.
+fn joint_shapes(
+    mesh: &TriangleMesh,
+    pieces: Vec<(usize, RegionShape, &[FaceId])>,
+) -> Vec<(usize, RegionShape)> {
+    let rounding = noise::ROUNDING * mesh.mean_edge_length();
+    let mut groups: Vec<(RegionShape, Vec<usize>)> = Vec::new();
+    for (i, &(_, shape, faces)) in pieces.iter().enumerate() {
+        let shape = refit(mesh, shape, faces);
+        let fits = |other: &RegionShape| {
+            let alike = match (shape, other) {
+                (RegionShape::Plane { normal: a, .. }, RegionShape::Plane { normal: b, .. }) => {
+                    a.dot(*b) > 0.0
+                }
+                (RegionShape::Cylinder { hole: a, .. }, RegionShape::Cylinder { hole: b, .. }) => a == *b,
+                _ => false,
+            };
+            alike && faces.iter().flat_map(|&f| mesh.corners(f)).all(|p| distance(other, p).abs() <= rounding)
+        };
+        match groups.iter_mut().find(|(other, _)| fits(other)) {
+            Some((_, members)) => members.push(i),
+            None => groups.push((shape, vec![i])),
+        }
     }
+    let mut fitted: Vec<(usize, RegionShape)> = pieces.iter().map(|&(p, shape, _)| (p, shape)).collect();
+    for (shape, members) in groups {
+        let all: Vec<FaceId> = members.iter().flat_map(|&i| pieces[i].2).copied().collect();
+        let shape = if members.len() > 1 { refit(mesh, shape, &all) } else { shape };
+        for i in members {
+            fitted[i].1 = match shape {
+                RegionShape::Cylinder { point, axis, radius, hole } => {
+                    cylinder::shape(mesh, fit::Cylinder { point, axis, radius }, pieces[i].2, hole)
+                }
+                plane => plane,
+            };
+        }
+    }
+    fitted
+}
+
+/// Signed distance of a point from a shape.
+fn distance(shape: &RegionShape, p: DVec3) -> f64 {
+    match *shape {
+        RegionShape::Plane { point, normal } => normal.dot(p - point),
+        RegionShape::Cylinder { point, axis, radius, .. } => {
+            fit::Cylinder { point, axis, radius }.distance(p)
+        }
+    }
+}
+
+/// The shape of least squares through faces that were found with a shape near it.
+fn refit(mesh: &TriangleMesh, shape: RegionShape, faces: &[FaceId]) -> RegionShape {
+    let better = match shape {
+        RegionShape::Plane { .. } => {
+            fit::plane(mesh, faces).map(|(point, normal)| RegionShape::Plane { point, normal })
+        }
+        RegionShape::Cylinder { point, axis, radius, hole } => fit::Cylinder { point, axis, radius }
+            .refine(&cylinder::points(mesh, faces), 20)
+            .map(|better| cylinder::shape(mesh, better, faces, hole)),
+    };
+    better.unwrap_or(shape)
 }
 
 impl Features {
@@ -119,29 +288,27 @@ impl Features {
             let region = &mut self.regions[id.index()];
             region.area += mesh.area_vector(f).length() / 2.0;
             for p in mesh.corners(f) {
-                let distance = match region.shape {
-                    RegionShape::Plane { point, normal } => normal.dot(p - point),
-                    RegionShape::Cylinder { point, axis, radius, .. } => {
-                        fit::Cylinder { point, axis, radius }.distance(p)
-                    }
-                };
-                region.residual = region.residual.max(distance.abs());
+                region.residual = region.residual.max(distance(&region.shape, p).abs());
             }
         }
     }
 }
 
-/// Vertices with one sector of faces of one plane and one sector of free faces around them, nothing else.
-fn outline(
+/// How many rings of vertices inside an outline give way with it. With none, an outline that straightens runs into
+/// the frozen inside of its face and stops.
+const GIVING_RINGS: usize = 2;
+
+/// Outline vertices have one sector of faces of one region and one sector of free faces around them, nothing else.
+fn sliding(
     part: &Part,
     connectivity: &Connectivity,
     parameters: &Parameters,
-    regions: &[Region],
     region_of_face: &[RegionId],
-) -> Vec<OutlineVertex> {
+) -> Vec<SlidingVertex> {
     let fixed =
         |f: FaceId| parameters.freeze_non_design && part.design[f.index()] == topipe_mesh::Design::NonDesign;
-    let mut outline = Vec::new();
+    let mut found: Vec<Option<SlidingVertex>> = vec![None; part.mesh.vertex_count()];
+    let mut last = Vec::new();
     for v in part.mesh.vertices() {
         if part.frozen[v.index()] || connectivity.is_border(v) {
             continue;
@@ -165,14 +332,33 @@ fn outline(
                 changes += 1;
             }
         }
-        if !alone || changes != 2 || !region.is_some() {
-            continue;
-        }
-        if let RegionShape::Plane { normal, .. } = regions[region.index()].shape {
-            outline.push(OutlineVertex { vertex: v.0, along, normal });
+        if alone && changes == 2 && region.is_some() {
+            found[v.index()] = Some(SlidingVertex { vertex: v.0, region, along: Some(along) });
+            last.push(v);
         }
     }
-    outline
+    for _ in 0..GIVING_RINGS {
+        let mut next = Vec::new();
+        for v in last {
+            let Some(SlidingVertex { region, .. }) = found[v.index()] else { continue };
+            for h in connectivity.outgoing(v) {
+                let w = connectivity.target(h);
+                let inside = |g: topipe_mesh::HalfEdgeId| {
+                    region_of_face[g.face().index()] == region && !fixed(g.face())
+                };
+                if found[w.index()].is_none()
+                    && !part.frozen[w.index()]
+                    && !connectivity.is_border(w)
+                    && connectivity.outgoing(w).all(inside)
+                {
+                    found[w.index()] = Some(SlidingVertex { vertex: w.0, region, along: None });
+                    next.push(w);
+                }
+            }
+        }
+        last = next;
+    }
+    found.into_iter().flatten().collect()
 }
 
 /// The half-edges on the border of a set of faces: their own face is inside, the one across is not.

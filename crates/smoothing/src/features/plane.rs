@@ -1,14 +1,10 @@
 //! Flat faces by region growing.
 
 use super::border_half_edges;
-use super::fit::Symmetric;
-use crate::Parameters;
-use topipe_mesh::{Connectivity, DVec3, FaceId, Region, RegionShape, TriangleMesh};
+use super::fit;
+use super::noise::{Tolerance, is_systematic};
+use topipe_mesh::{Connectivity, DVec3, FaceId, RegionShape, TriangleMesh};
 use topipe_progress::{Interrupted, Progress};
-
-/// A flat face of less than `plane_area` is accepted when it is this share of the whole surface: a coarse CAD box has
-/// twelve facets.
-const LARGE_SHARE: f64 = 0.05;
 
 /// Facets with less than this many squared mean edge lengths of area have normals that say nothing.
 const SLIVER: f64 = 0.01;
@@ -20,6 +16,10 @@ const TERRACE_SHARE: f64 = 0.5;
 /// One voxel is 0.88 mean edge lengths high when its faces are cut into two triangles each.
 const HIGHEST_STEP: f64 = 1.5;
 
+/// Spread of the distances of a flat face's vertices, in median absolute deviations, that still belong to it: five
+/// standard deviations.
+const OUTLIER: f64 = 5.0 * 1.4826;
+
 struct Plane {
     point: DVec3,
     normal: DVec3,
@@ -30,8 +30,7 @@ struct Search<'a> {
     connectivity: &'a Connectivity,
     area_vectors: Vec<DVec3>,
     edge: f64,
-    tolerance: f64,
-    cosine: f64,
+    tolerance: Tolerance,
     /// Faces of a region found earlier.
     taken: Vec<bool>,
     /// Per face, the last growth that visited it.
@@ -39,29 +38,28 @@ struct Search<'a> {
     round: u32,
 }
 
-/// All flat faces, those with most facets first, with their facets; area and residual are left to measure.
+/// All flat patches of at least `least_area`, in the order of their first facets, with their facets.
+///
+/// Borders are as chance left them; see [`super::borders`].
 pub(super) fn planes(
     mesh: &TriangleMesh,
     connectivity: &Connectivity,
     taken: Vec<bool>,
-    parameters: &Parameters,
+    tolerance: Tolerance,
+    least_area: f64,
     progress: &Progress,
-) -> Result<Vec<(Region, Vec<FaceId>)>, Interrupted> {
-    let edge = mesh.mean_edge_length();
+) -> Result<Vec<(RegionShape, Vec<FaceId>)>, Interrupted> {
     let mut search = Search {
         mesh,
         connectivity,
         area_vectors: mesh.faces().map(|f| mesh.area_vector(f)).collect(),
-        edge,
-        tolerance: parameters.plane_tolerance * edge,
-        cosine: parameters.plane_angle.to_radians().cos(),
+        edge: mesh.mean_edge_length(),
+        tolerance,
         taken,
         visited: vec![0; mesh.face_count()],
         round: 0,
     };
-    let least = parameters.plane_area * edge * edge;
-    let large = LARGE_SHARE * mesh.area();
-    // Flat faces trimmed to their cores are judged; a seed inside a patch that failed need not be tried again.
+    // A seed inside a patch that failed need not be tried again.
     let mut tried = vec![false; mesh.face_count()];
     let mut found = Vec::new();
     for seed in mesh.faces() {
@@ -75,36 +73,18 @@ pub(super) fn planes(
         for f in &faces {
             tried[f.index()] = true;
         }
-        let core = search.open(&faces);
-        let (whole_area, core_area) = (search.area(&faces), search.area(&core));
-        // Opening removes teeth from a large face; a coarse face would lose itself.
-        let kept = if core_area >= 0.7 * whole_area { core } else { faces.clone() };
-        if (core_area < least && whole_area < large) || search.is_terrace(&plane, &kept) {
+        if search.area(&faces) < least_area
+            || search.is_terrace(&plane, &faces)
+            || search.is_curved(&plane, &faces)
+        {
             continue;
         }
-        for f in &kept {
+        for f in &faces {
             search.taken[f.index()] = true;
         }
-        let dropped = faces.into_iter().filter(|f| !search.taken[f.index()]).collect();
-        found.push(Found { plane, faces: kept, dropped });
+        found.push((RegionShape::Plane { point: plane.point, normal: plane.normal }, faces));
     }
-    search.return_corners(&mut found);
-    // By number of faces: unlike areas, counts are the same after a rotation.
-    found.sort_by(|a, b| b.faces.len().cmp(&a.faces.len()).then(a.faces[0].cmp(&b.faces[0])));
-    Ok(found
-        .into_iter()
-        .map(|Found { plane, faces, .. }| {
-            let shape = RegionShape::Plane { point: plane.point, normal: plane.normal };
-            (Region { shape, area: 0.0, residual: 0.0 }, faces)
-        })
-        .collect())
-}
-
-/// A flat face, with the teeth that opening took from it.
-struct Found {
-    plane: Plane,
-    faces: Vec<FaceId>,
-    dropped: Vec<FaceId>,
+    Ok(found)
 }
 
 impl Search<'_> {
@@ -126,47 +106,72 @@ impl Search<'_> {
             let across = self.connectivity.neighbor(face, k);
             across.is_some()
                 && !self.taken[across.index()]
-                && self.area_vectors[across.index()].normalize_or_zero().dot(normal) >= self.cosine
+                && self.area_vectors[across.index()].normalize_or_zero().dot(normal) >= self.tolerance.cosine
         })
     }
 
-    fn fits(&self, plane: &Plane, face: FaceId) -> bool {
+    fn fits(&self, plane: &Plane, face: FaceId, distance: f64) -> bool {
         if self.taken[face.index()] {
             return false;
         }
-        let near = self
-            .mesh
-            .corners(face)
-            .iter()
-            .all(|&p| plane.normal.dot(p - plane.point).abs() <= self.tolerance);
+        let near =
+            self.mesh.corners(face).iter().all(|&p| plane.normal.dot(p - plane.point).abs() <= distance);
         near && (self.is_sliver(face)
-            || self.area_vectors[face.index()].normalize_or_zero().dot(plane.normal) >= self.cosine)
+            || self.area_vectors[face.index()].normalize_or_zero().dot(plane.normal) >= self.tolerance.cosine)
     }
 
-    /// Grows from `seed`, refitting as it grows and at the end, until the set of faces repeats.
+    /// Grows from `seed`, refitting as it grows and at the end, until the set of faces repeats; then once more with
+    /// what the vertices themselves deviate, so that chance neighbours of an exact face fall off.
     fn region(&mut self, seed: FaceId) -> Option<(Plane, Vec<FaceId>)> {
         let mut plane = Plane {
             point: self.mesh.centroid(seed),
             normal: self.area_vectors[seed.index()].normalize_or_zero(),
         };
-        let mut faces = self.grow(&mut plane, seed, true);
-        for _ in 0..4 {
+        let mut limit = self.tolerance.distance;
+        let mut faces = self.grow(&mut plane, seed, limit, true);
+        for round in 0..6 {
             plane = self.fit(&faces)?;
-            if !self.fits(&plane, seed) {
+            if round >= 1 {
+                limit = (OUTLIER * self.median_distance(&plane, &faces))
+                    .clamp(self.tolerance.rounding, self.tolerance.distance);
+            }
+            if !self.fits(&plane, seed, limit) {
                 return None;
             }
-            let again = self.grow(&mut plane, seed, false);
+            let again = self.grow(&mut plane, seed, limit, false);
             let same = again.len() == faces.len();
             faces = again;
-            if same {
+            if same && round >= 1 {
                 break;
             }
         }
+        plane = self.fit(&faces)?;
         faces.sort_unstable();
         Some((plane, faces))
     }
 
-    fn grow(&mut self, plane: &mut Plane, seed: FaceId, refit: bool) -> Vec<FaceId> {
+    fn median_distance(&self, plane: &Plane, faces: &[FaceId]) -> f64 {
+        let mut distances: Vec<f64> = faces
+            .iter()
+            .flat_map(|&f| self.mesh.corners(f))
+            .map(|p| plane.normal.dot(p - plane.point).abs())
+            .collect();
+        let middle = distances.len() / 2;
+        *distances.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    /// True when the facets bulge: part of a sphere, of a fine cylinder, of any smooth surface.
+    fn is_curved(&self, plane: &Plane, faces: &[FaceId]) -> bool {
+        let (u, v) = plane.normal.any_orthonormal_pair();
+        let corners = || faces.iter().flat_map(|&f| self.mesh.corners(f)).map(|p| p - plane.point);
+        let size = corners().map(|d| d.length()).fold(0.0, f64::max);
+        let samples: Vec<[f64; 3]> =
+            corners().map(|d| [d.dot(u) / size, d.dot(v) / size, d.dot(plane.normal)]).collect();
+        let rms = (samples.iter().map(|s| s[2] * s[2]).sum::<f64>() / samples.len() as f64).sqrt();
+        rms > self.tolerance.rounding && is_systematic(&samples)
+    }
+
+    fn grow(&mut self, plane: &mut Plane, seed: FaceId, limit: f64, refit: bool) -> Vec<FaceId> {
         self.round += 1;
         let mut faces = vec![seed];
         self.visited[seed.index()] = self.round;
@@ -177,7 +182,9 @@ impl Search<'_> {
             next += 1;
             for k in 0..3 {
                 let across = self.connectivity.neighbor(face, k);
-                if across.is_some() && self.visited[across.index()] != self.round && self.fits(plane, across)
+                if across.is_some()
+                    && self.visited[across.index()] != self.round
+                    && self.fits(plane, across, limit)
                 {
                     self.visited[across.index()] = self.round;
                     faces.push(across);
@@ -193,62 +200,8 @@ impl Search<'_> {
         faces
     }
 
-    /// The plane of least squares through the vertices, weighted by area.
     fn fit(&self, faces: &[FaceId]) -> Option<Plane> {
-        let mut direction = DVec3::ZERO;
-        let mut point = DVec3::ZERO;
-        let mut weight = 0.0;
-        for &f in faces {
-            let area = self.area_vectors[f.index()];
-            direction += area;
-            point += area.length() * self.mesh.centroid(f);
-            weight += area.length();
-        }
-        if weight <= 0.0 {
-            return None;
-        }
-        point /= weight;
-        let mut moments = Symmetric::default();
-        for &f in faces {
-            let area = self.area_vectors[f.index()].length();
-            for p in self.mesh.corners(f) {
-                moments.add((p - point) / self.edge, area / weight);
-            }
-        }
-        let normal = moments.eigen().1[0];
-        Some(Plane { point, normal: if normal.dot(direction) < 0.0 { -normal } else { normal } })
-    }
-
-    /// Gives facets back that opening took although they are no teeth: at the corner of a block one facet may have
-    /// all its vertices on edges. All faces around such a vertex are flat, those around the tip of a tooth are not.
-    fn return_corners(&mut self, found: &mut [Found]) {
-        let mut flat = self.taken.clone();
-        for f in found.iter().flat_map(|p| &p.dropped) {
-            flat[f.index()] = true;
-        }
-        for region in found {
-            self.round += 1;
-            for f in &region.faces {
-                self.visited[f.index()] = self.round;
-            }
-            let (connectivity, visited, round) = (self.connectivity, &self.visited, self.round);
-            let returned: Vec<FaceId> = region
-                .dropped
-                .iter()
-                .copied()
-                .filter(|&f| {
-                    self.mesh.triangles[f.index()].iter().all(|&v| {
-                        connectivity.outgoing(v).any(|h| visited[h.face().index()] == round)
-                            || connectivity.outgoing(v).all(|h| flat[h.face().index()])
-                    })
-                })
-                .collect();
-            for f in &returned {
-                self.taken[f.index()] = true;
-            }
-            region.faces.extend(returned);
-            region.faces.sort_unstable();
-        }
+        fit::plane(self.mesh, faces).map(|(point, normal)| Plane { point, normal })
     }
 
     /// True when most of the border is the edge of a step, as around each layer of a voxel mesh. Its own flat faces
@@ -276,30 +229,11 @@ impl Search<'_> {
             let offsets = self.mesh.corners(f).map(|p| plane.normal.dot(p - plane.point).abs());
             let low = offsets.iter().fold(f64::INFINITY, |a, &b| a.min(b));
             let high = offsets.iter().fold(0.0, |a: f64, &b| a.max(b));
-            low > 10.0 * self.tolerance && high - low <= self.tolerance && high <= HIGHEST_STEP * self.edge
+            let flat = 0.01 * self.edge;
+            low > 10.0 * flat && high - low <= flat && high <= HIGHEST_STEP * self.edge
         };
         let around =
             |f: FaceId| (0..3).map(move |k| self.connectivity.neighbor(f, k)).filter(|g| g.is_some());
         upright(riser) && around(riser).any(|f| tread(f) || (upright(f) && around(f).any(tread)))
-    }
-
-    /// Faces with a vertex whose whole ring is in `faces` (a morphological opening): drops teeth and strips of one
-    /// facet's width.
-    fn open(&mut self, faces: &[FaceId]) -> Vec<FaceId> {
-        self.round += 1;
-        for f in faces {
-            self.visited[f.index()] = self.round;
-        }
-        let (connectivity, visited, round) = (self.connectivity, &self.visited, self.round);
-        faces
-            .iter()
-            .copied()
-            .filter(|&f| {
-                self.mesh.triangles[f.index()].iter().any(|&v| {
-                    !connectivity.is_border(v)
-                        && connectivity.outgoing(v).all(|h| visited[h.face().index()] == round)
-                })
-            })
-            .collect()
     }
 }

@@ -29,7 +29,10 @@ fn parameters_out_of_range_name_the_range_and_its_source() {
             Parameters { tolerance: -1.0, ..plain.clone() },
             ["`tolerance` is -1", "at least 0", "edge lengths"],
         ),
-        (Parameters { plane_angle: 90.0, ..plain.clone() }, ["`plane_angle` is 90", "at most 45", "degrees"]),
+        (
+            Parameters { plane_angle: Some(90.0), ..plain.clone() },
+            ["`plane_angle` is 90", "at most 45", "degrees"],
+        ),
         (Parameters { sharp_angle: 5.0, ..plain.clone() }, ["`sharp_angle` is 5", "20 and 180", "degrees"]),
     ];
     for (parameters, words) in cases {
