@@ -1,6 +1,7 @@
 //! The axis of one branch: plane sections across it, each point moved to the area centroid of its section.
 
 use super::branches::Branch;
+use super::junction::Ray;
 use super::section::{Cutter, Loop};
 use glam::DVec3;
 
@@ -93,8 +94,8 @@ impl Axis {
         areas.get(areas.len() / 2).map_or(0.0, |a| (a / std::f64::consts::PI).sqrt())
     }
 
-    /// A point of the straight axis near one end and its direction outwards; `None` with fewer than two sections.
-    pub(super) fn ray(&self, at_start: bool) -> Option<(DVec3, DVec3)> {
+    /// The straight axis near one end; `None` with fewer than two sections.
+    pub(super) fn ray(&self, at_start: bool) -> Option<Ray> {
         if self.sections.len() < 2 {
             return None;
         }
@@ -110,7 +111,9 @@ impl Axis {
         let begin = (0..most).find(settled).unwrap_or(0);
         let centroids: Vec<_> = inwards[begin..].iter().map(|l| l.centroid).collect();
         let direction = end_direction(&centroids, true);
-        (direction != DVec3::ZERO).then_some((centroids[0], direction))
+        // The error of a direction goes with the inverse of the length it is taken from.
+        let weight = (centroids.len().min(STRAIGHT) as f64 / STRAIGHT as f64).powi(2);
+        (direction != DVec3::ZERO).then_some(Ray { point: centroids[0], direction, weight })
     }
 }
 

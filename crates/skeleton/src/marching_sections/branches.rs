@@ -42,6 +42,8 @@ pub(super) struct BranchGraph {
     /// Where their critical vertices lie, on the surface.
     places: Vec<DVec3>,
     pub(super) branches: Vec<Option<Branch>>,
+    /// Nodes that stay although only two branches are left: their axes meet at an angle.
+    corners: Vec<bool>,
     /// Branches that end or once ended at each node: noise makes many, so they are not searched for.
     incident: Vec<Vec<usize>>,
 }
@@ -83,7 +85,8 @@ impl BranchGraph {
         for (b, arc) in reeb.arcs.iter().enumerate() {
             arc.ends.iter().for_each(|&n| incident[n as usize].push(b));
         }
-        Self { nodes, places, branches, incident }
+        let corners = vec![false; reeb.nodes.len()];
+        Self { nodes, places, branches, corners, incident }
     }
 
     /// The branches at a node, each with the end it has there; a branch that returns to the node comes twice.
@@ -137,6 +140,27 @@ impl BranchGraph {
         }
     }
 
+    /// Removes a free end in which the two other branches of its foot `node` run into each other; these then meet in
+    /// a corner.
+    pub(super) fn absorb(&mut self, b: usize, node: usize) {
+        self.corners[node] = true;
+        self.branches[b] = None;
+    }
+
+    pub(super) fn is_corner(&self, node: usize) -> bool {
+        self.corners[node]
+    }
+
+    /// The tip of a free end on a saddle, and the saddle.
+    pub(super) fn free_end(&self, b: usize) -> Option<(DVec3, usize)> {
+        let branch = self.branches[b].as_ref()?;
+        match branch.ends.map(|n| self.nodes[n]) {
+            [NodeKind::Tip(tip), NodeKind::Saddle] => Some((tip, branch.ends[1])),
+            [NodeKind::Saddle, NodeKind::Tip(tip)] => Some((tip, branch.ends[0])),
+            _ => None,
+        }
+    }
+
     /// Makes the two ends of a branch one node.
     pub(super) fn contract(&mut self, b: usize) {
         let Some(gone) = self.branches[b].take() else { return };
@@ -154,11 +178,7 @@ impl BranchGraph {
     /// that is no free end on a saddle.
     fn bump_height(&self, b: usize) -> Option<f64> {
         let branch = self.branches[b].as_ref()?;
-        let (tip, foot) = match branch.ends.map(|n| self.nodes[n]) {
-            [NodeKind::Tip(tip), NodeKind::Saddle] => (tip, branch.ends[1]),
-            [NodeKind::Saddle, NodeKind::Tip(tip)] => (tip, branch.ends[0]),
-            _ => return None,
-        };
+        let (tip, foot) = self.free_end(b)?;
         let near: Vec<Sample> = (self.at(foot).into_iter())
             .filter(|(other, _)| *other != b)
             .filter_map(|(other, end)| {
@@ -179,7 +199,7 @@ impl BranchGraph {
 
     /// Where exactly two ends of two branches meet in a saddle, they become one branch.
     fn join(&mut self, node: usize) {
-        if self.nodes[node] != NodeKind::Saddle {
+        if self.nodes[node] != NodeKind::Saddle || self.corners[node] {
             return;
         }
         let [(a, end_a), (b, end_b)] = self.at(node)[..] else { return };

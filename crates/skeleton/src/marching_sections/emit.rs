@@ -2,16 +2,22 @@
 
 use super::axis::{Axis, OWN, resample};
 use super::branches::{Branch, BranchGraph, NodeKind};
+use super::junction::Ray;
 use super::piece::Piece;
 use super::section::{Cutter, Loop};
 use super::{junction, mean};
 use crate::Parameters;
 use crate::inside::Inside;
+use crate::interface::Sets;
 use crate::skeleton::{PointKind, Section, Skeleton};
 use glam::DVec3;
 
 /// Rounds of the last centring: each turns the tangents of the neighbours, so one is not enough.
 const ROUNDS: usize = 4;
+
+/// A junction this many times as far from the middle of the ends of its axes as these are is none: the axes are
+/// nearly parallel.
+const FARTHEST: f64 = 3.0;
 
 /// No point nearer to a junction, interface or end than this many local radii.
 const CLEARANCE: f64 = 1.0;
@@ -29,6 +35,7 @@ pub(super) fn emit(
     graph: &BranchGraph,
     axes: &[Axis],
     parameters: &Parameters,
+    sets: &Sets,
     inside: &Inside,
     interface_points: &[u32],
 ) {
@@ -45,7 +52,7 @@ pub(super) fn emit(
                 Place { at: skeleton.points[point as usize], point: Some(point) }
             }
             NodeKind::Saddle => {
-                let at = meeting_point(graph, axes, &incident, inside);
+                let at = meeting_point(graph, axes, node, sets, inside);
                 let point = (!ring).then(|| skeleton.add_point(at, PointKind::Junction, Section::None));
                 Place { at, point }
             }
@@ -85,10 +92,12 @@ pub(super) fn emit(
     }
 }
 
-/// The least-squares intersection of the axes of the branches, if it lies in the material near them.
-fn meeting_point(graph: &BranchGraph, axes: &[Axis], incident: &[(usize, usize)], inside: &Inside) -> DVec3 {
-    let lines: Vec<_> = incident.iter().filter_map(|&(b, end)| axes[b].ray(end == 0)).collect();
-    let ends: Vec<_> = lines.iter().map(|l| l.0).collect();
+/// The least-squares intersection of the axes of the branches, if it lies in the material near them and before the
+/// interfaces they lead to.
+fn meeting_point(graph: &BranchGraph, axes: &[Axis], node: usize, sets: &Sets, inside: &Inside) -> DVec3 {
+    let incident = graph.at(node);
+    let rays: Vec<_> = incident.iter().filter_map(|&(b, end)| axes[b].ray(end == 0)).collect();
+    let ends: Vec<_> = rays.iter().map(|r| r.point).collect();
     let samples: Vec<_> = incident
         .iter()
         .filter_map(|&(b, end)| {
@@ -98,23 +107,32 @@ fn meeting_point(graph: &BranchGraph, axes: &[Axis], incident: &[(usize, usize)]
         .collect();
     let middle = mean(&ends).or(mean(&samples)).unwrap_or(DVec3::ZERO);
     let around = ends.iter().map(|e| e.distance(middle)).fold(0.0, f64::max);
-    let met = junction::intersection(&lines, middle);
+    let met = junction::intersection(&rays, middle);
+    let ahead = |p: DVec3| {
+        incident.iter().all(|&(b, end)| {
+            let other = graph.branches[b].as_ref().map(|branch| graph.nodes[branch.ends[1 - end]]);
+            let Some(NodeKind::Interface(i)) = other else { return true };
+            (p - sets.interfaces[i].centroid).dot(sets.interfaces[i].normal) >= 0.0
+        })
+    };
     let mut choices = vec![middle];
-    if met.distance(middle) <= 1.5 * around {
-        choices.insert(0, met);
-        choices.push(met.lerp(middle, 0.5));
+    if graph.is_corner(node) || met.distance(middle) <= FARTHEST * around {
+        let back = [0.75, 0.5, 0.25].map(|t| middle.lerp(met, t));
+        choices.splice(0..0, std::iter::once(met).chain(back));
     }
     choices.extend(mean(&samples));
     choices.extend(inside.nearest_middle(middle));
     choices.extend(ends);
     choices.extend(samples);
-    choices.iter().copied().find(|&p| inside.contains(p)).unwrap_or(middle)
+    let within = |p: &DVec3| inside.contains(*p);
+    let found = choices.iter().copied().find(|p| within(p) && ahead(*p));
+    found.or(choices.iter().copied().find(within)).unwrap_or(middle)
 }
 
 /// A free end: straight on from the last clean section, to just below the surface.
 fn free_end(branch: Option<&Branch>, axis: &Axis, at_start: bool, tip: DVec3, inside: &Inside) -> DVec3 {
     let mut choices = Vec::new();
-    if let Some((end, direction)) = axis.ray(at_start) {
+    if let Some(Ray { point: end, direction, .. }) = axis.ray(at_start) {
         let step = 0.05 * axis.radius();
         let most = (end.distance(tip) / step).clamp(1.0, 1000.0) as usize;
         let reached = (1..=most).take_while(|&k| inside.contains(end + k as f64 * step * direction)).count();
@@ -149,7 +167,10 @@ fn centred(
     if total == 0 {
         return Vec::new();
     }
-    let pick = |k: usize| if count == 1 { total / 2 } else { k * (total - 1) / (count - 1) };
+    // The same from either end, as which one comes first depends on ties.
+    let pick = |k: usize| {
+        if count == 1 { total / 2 } else { (2 * k * (total - 1) + count - 1) / (2 * (count - 1)) }
+    };
     let mut picked: Vec<usize> = (0..count).map(pick).collect();
     picked.dedup();
     if picked.len() < least {
