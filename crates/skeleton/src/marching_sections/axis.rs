@@ -143,8 +143,9 @@ fn clean_range(loops: &[Option<Loop>], ratio: f64) -> Option<Vec<usize>> {
         found.get(found.len() / 4).map(|m| m.1)
     };
     let start = narrow(n / 5, n - n / 5).or_else(|| narrow(0, n))?;
-    // The ratio is one of widths; areas go with its square.
-    let ratio = ratio * ratio;
+    // The ratio is one of widths; areas go with its square. From one section to the next, a fillet adds little, a
+    // beam that joins at a small angle all of its area: there the ratio holds for areas.
+    let (leap, ratio) = (ratio, ratio * ratio);
     let walk = |indices: &mut dyn Iterator<Item = usize>| {
         let mut kept = vec![start];
         let mut bad = 0;
@@ -153,12 +154,13 @@ fn clean_range(loops: &[Option<Loop>], ratio: f64) -> Option<Vec<usize>> {
                 kept.iter().rev().take(MEDIAN_WINDOW).filter_map(|&i| usable(i).map(|l| l.area)).collect();
             recent.sort_by(f64::total_cmp);
             let median = recent[recent.len() / 2];
-            let previous = usable(kept[kept.len() - 1]).map(|l| l.centroid);
+            let previous = usable(kept[kept.len() - 1]);
             let fine = usable(k).is_some_and(|l| {
-                let leap = previous.map_or(0.0, |p| p.distance(l.centroid));
+                let moved = previous.map_or(0.0, |p| p.centroid.distance(l.centroid));
                 l.area <= ratio * median
                     && l.area * 1.5 * ratio >= median
-                    && leap < (0.8 + bad as f64 * WORKING_SPACING) * (median / std::f64::consts::PI).sqrt()
+                    && previous.is_none_or(|p| l.area <= leap * p.area)
+                    && moved < (0.8 + bad as f64 * WORKING_SPACING) * (median / std::f64::consts::PI).sqrt()
             });
             if fine {
                 kept.push(k);

@@ -16,8 +16,8 @@ use glam::DVec3;
 const ROUNDS: usize = 4;
 
 /// A junction this many times as far from the middle of the ends of its axes as these are is none: the axes are
-/// nearly parallel.
-const FARTHEST: f64 = 3.0;
+/// nearly parallel. At the foot of monster-lite two beams meet at 40 degrees, 3.5 times as far.
+const FARTHEST: f64 = 4.0;
 
 /// No point nearer to a junction, interface or end than this many local radii.
 const CLEARANCE: f64 = 1.0;
@@ -32,8 +32,7 @@ struct Place {
 pub(super) fn emit(
     skeleton: &mut Skeleton,
     piece: &Piece,
-    graph: &BranchGraph,
-    axes: &[Axis],
+    (graph, axes): (&BranchGraph, &[Axis]),
     parameters: &Parameters,
     sets: &Sets,
     inside: &Inside,
@@ -121,9 +120,12 @@ fn meeting_point(graph: &BranchGraph, axes: &[Axis], node: usize, sets: &Sets, i
         choices.splice(0..0, std::iter::once(met).chain(back));
     }
     choices.extend(mean(&samples));
-    choices.extend(inside.nearest_middle(middle));
-    choices.extend(ends);
+    // Between the legs of a V the middle is in the void.
+    let mut nearest = ends;
+    nearest.sort_by(|a, b| a.distance(middle).total_cmp(&b.distance(middle)));
+    choices.extend(nearest);
     choices.extend(samples);
+    choices.extend(inside.nearest_middle(middle));
     let within = |p: &DVec3| inside.contains(*p);
     let found = choices.iter().copied().find(|p| within(p) && ahead(*p));
     found.or(choices.iter().copied().find(within)).unwrap_or(middle)
@@ -178,6 +180,8 @@ fn centred(
     }
     let mut points: Vec<Loop> = picked.into_iter().map(|k| sections[k].clone()).collect();
     let near = 2.5 * radius;
+    // What each section may grow to in all rounds together.
+    let mut most: Vec<f64> = points.iter().map(|l| parameters.junction_ratio * l.area).collect();
     cutter.claim(&branch.vertices);
     for round in 0..ROUNDS {
         let n = points.len();
@@ -196,12 +200,9 @@ fn centred(
                 continue;
             }
             let found = cutter.cut(points[k].centroid, tangent, &branch.vertices, near);
-            if let Some(found) = found.filter(|l| {
-                l.holds_centroid
-                    && !l.cut_off
-                    && l.own >= OWN
-                    && l.area <= parameters.junction_ratio.powi(2) * points[k].area
-            }) {
+            if let Some(found) =
+                found.filter(|l| l.holds_centroid && !l.cut_off && l.own >= OWN && l.area <= most[k])
+            {
                 good[k] = inside.contains(found.centroid);
                 next[k] = found;
             }
@@ -220,6 +221,8 @@ fn centred(
         }
         let mut kept = keep.iter();
         points.retain(|_| *kept.next().unwrap_or(&true));
+        let mut kept = keep.iter();
+        most.retain(|_| *kept.next().unwrap_or(&true));
         if round + 1 == ROUNDS {
             break;
         }

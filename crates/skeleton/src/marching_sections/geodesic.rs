@@ -68,6 +68,12 @@ pub(super) fn distance(piece: &Piece, sources: &[VertexId]) -> Vec<f64> {
             }
         }
     }
+    // Symmetric parts have equal distances but for rounding, which depends on how the part lies. A grid far finer than
+    // any feature makes them equal, and then the order of the vertices decides.
+    let grid = 1e-7 * mesh.mean_edge_length();
+    if grid > 0.0 {
+        distance.iter_mut().for_each(|d| *d = (*d / grid).round() * grid);
+    }
     for &(_, tip) in &piece.tips {
         distance[tip.index()] = -1.0;
     }
