@@ -466,8 +466,6 @@ fn killed_runs_leave_nothing_that_misleads_the_next_one() {
             .iter()
             .flat_map(|bucket| files_below(&root.join(bucket)))
             .map(|file| file.strip_prefix(&root).unwrap().to_owned())
-            // What was being written when the process died; it is under no name that anyone looks for.
-            .filter(|file| !file.file_name().unwrap().to_str().unwrap().starts_with(".topipe-"))
             .collect()
     };
     let clean = Workshop::new();
@@ -518,6 +516,52 @@ fn processes_on_one_cache_compute_each_result_once() {
         assert_eq!(shop.read(&format!("out{k}/report.json")), shop.read("out0/report.json"));
     }
     assert!(files_below(&shop.path(".topipe/locks-v1")).is_empty());
+}
+
+#[test]
+fn runs_can_be_compared_pinned_and_thrown_away() {
+    let shop = Workshop::new();
+    shop.events(&["--out", "one"]);
+    shop.events(&["--out", "two", "--set", "smooth.lambda=0.5"]);
+    let same = shop.topipe(&["diff", "one", "one/run.json"]).stdout;
+    assert!(same.starts_with("no difference"), "{same}");
+    let diff = shop.topipe(&["diff", "one", "two"]).stdout;
+    for part in ["smooth: another result\n  lambda: 0.6307 -> 0.5\n", "report.json: differs", "volume_error"]
+    {
+        assert!(diff.contains(part), "no `{part}` in\n{diff}");
+    }
+    let json: Value = serde_json::from_str(&shop.topipe(&["diff", "one", "two", "--json"]).stdout).unwrap();
+    assert_eq!(json["stages"][0]["reasons"][0]["field"], "lambda");
+    assert_eq!(shop.topipe(&["diff", "one", "three"]).code, 2);
+
+    let runs = shop.topipe(&["cache", "ls", "--runs"]).stdout;
+    assert_eq!(runs.lines().count(), 3, "{runs}");
+    assert_eq!(shop.topipe(&["cache", "pin", "one"]).code, 0);
+    assert!(shop.topipe(&["cache", "ls", "--runs"]).stdout.contains("pinned"));
+    let plan = shop.topipe(&["cache", "gc", "--max-size", "0B"]).stdout;
+    assert!(plan.contains("would have to compute again: smooth, check"), "{plan}");
+    assert!(plan.contains("nothing is deleted yet"), "{plan}");
+    assert_eq!(shop.topipe(&["cache", "gc", "--max-size", "0B", "--delete"]).code, 0);
+    assert_eq!(shop.events(&["--out", "one"])[1..4], NOTHING[1..4]);
+    assert_eq!(shop.topipe(&["cache", "pin", "one", "--remove"]).code, 0);
+    assert_eq!(shop.topipe(&["cache", "gc", "--max-age", "0s", "--delete"]).code, 0);
+    assert_eq!(shop.events(&["--out", "one"])[1], "stage-started mesh");
+    for wrong in [["--max-size", "big"], ["--max-age", "long"]] {
+        assert_eq!(shop.topipe(&[&["cache", "gc"][..], &wrong].concat()).code, 2);
+    }
+}
+
+#[test]
+fn what_a_stage_said_can_be_read_again() {
+    let shop = Workshop::new();
+    assert!(shop.topipe(&["log", "box.toml"]).stdout.contains("mesh: no result in the cache"));
+    shop.topipe(&["run", "box.toml"]);
+    let log = shop.topipe(&["log", "box.toml", "mesh"]).stdout;
+    // The box is given in squares.
+    let remark = log.lines().nth(1).unwrap();
+    assert!(remark.starts_with("mesh: "), "{log}");
+    let again = shop.topipe(&["run", "box.toml", "-v"]).stderr;
+    assert!(again.contains(remark), "no `{remark}` in\n{again}");
 }
 
 fn files_below(folder: &Path) -> Vec<PathBuf> {

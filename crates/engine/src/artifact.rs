@@ -41,6 +41,7 @@ pub struct ArtifactType {
     pub version: u32,
     encode: fn(&Value, &ArtifactType) -> Result<Vec<u8>, EncodeError>,
     decode: fn(&[u8], &ArtifactType) -> Result<Value, DecodeError>,
+    to_json: fn(&Value) -> Option<serde_json::Value>,
 }
 
 impl ArtifactType {
@@ -57,12 +58,18 @@ impl ArtifactType {
                 codec::decode::<K::Value>(bytes, kind.name, kind.version)
                     .map(|value| Arc::new(value) as Value)
             },
+            to_json: |value| serde_json::to_value(value.downcast_ref::<K::Value>()?).ok(),
         }
     }
 
     /// The file of `value`.
     pub fn encode(&self, value: &Value) -> Result<Vec<u8>, EncodeError> {
         (self.encode)(value, self)
+    }
+
+    /// `value` as JSON, to pick figures from; nothing if it is of another kind or cannot be written as JSON.
+    pub fn to_json(&self, value: &Value) -> Option<serde_json::Value> {
+        (self.to_json)(value)
     }
 
     /// The value in a file.

@@ -1,6 +1,6 @@
 //! The one function that decides whether a stage runs. `plan` shows its answers, `run` follows them.
 
-use crate::cache::{Bucket, Cache, CacheError, Damage, KeyRecord};
+use crate::cache::{Bucket, Cache, CacheError, Damage, KeyRecord, Lease};
 use crate::hash::ContentHash;
 use crate::history::{History, StageHistory};
 use crate::input_file::{self, InputFileError};
@@ -46,6 +46,8 @@ pub(crate) struct Decider<'a> {
     pub(crate) cache: &'a Cache,
     pub(crate) selection: &'a Selection,
     pub(crate) history: History,
+    /// Keeps what is looked up from being thrown away, for as long as the decider lives.
+    pub(crate) lease: Option<Lease>,
     code_versions: Vec<String>,
     files: Vec<FileHashes>,
 }
@@ -64,7 +66,7 @@ impl<'a> Decider<'a> {
         let history =
             cache.read_record(Bucket::History, &History::name_for(&pipeline.path)).unwrap_or_default();
         let code_versions = pipeline.stages.iter().map(|node| node.stage.code_version()).collect();
-        Ok(Self { pipeline, cache, selection, history, code_versions, files })
+        Ok(Self { pipeline, cache, selection, history, lease: None, code_versions, files })
     }
 
     /// Decides about one stage. Damaged files of the cache are moved aside and told in `damages`.
@@ -112,6 +114,9 @@ impl<'a> Decider<'a> {
         key: ContentHash,
         damages: &mut Vec<Damage>,
     ) -> Result<Option<KeyRecord>, CacheError> {
+        if let Some(lease) = &self.lease {
+            lease.hold(&[key]);
+        }
         let record = self.cache.key_record(key, damages)?;
         Ok(record.filter(|record| self.cache.has_artifact(record, damages)))
     }

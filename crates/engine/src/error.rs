@@ -3,10 +3,10 @@
 use crate::cache::CacheError;
 use crate::diagnostic::Diagnostic;
 use crate::spec::SpecError;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How a command ends, as the exit code of the process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExitCode {
     /// Everything asked for is done.

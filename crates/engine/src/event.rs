@@ -29,6 +29,8 @@ pub enum Event {
         key: ContentHash,
         /// Its artifact.
         artifact: ContentHash,
+        /// What it remarked when it was computed.
+        remarks: Vec<String>,
     },
     /// Another process computes the same thing; we wait for it.
     StageWaiting {

@@ -90,6 +90,7 @@
 mod artifact;
 pub mod cache;
 pub mod codec;
+mod compare;
 mod decide;
 mod diagnostic;
 mod error;
@@ -113,6 +114,7 @@ mod stage;
 
 pub use artifact::{ArtifactKind, ArtifactType, Value};
 pub use cache::{Cache, UnitCounts, UnitsAtHand};
+pub use compare::{RunDifference, StageDifference, compare};
 pub use decide::Decision;
 pub use diagnostic::{Diagnostic, Source, nearest};
 pub use error::{EngineError, ExitCode};

@@ -66,7 +66,11 @@ pub enum Command {
     Inspect(InspectArguments),
     /// Draw a mesh file, an artifact file, or the result of a stage as PNG.
     Render(RenderArguments),
-    /// Look at the cache.
+    /// Say what differs between two runs: parameters, inputs, code, results.
+    Diff(DiffArguments),
+    /// Say again what the stages of a pipeline said when their results were computed.
+    Log(LogArguments),
+    /// Look at the cache, or throw away what is needed least.
     Cache(CacheArguments),
     /// Write a commented pipeline for a mesh.
     New(NewArguments),
@@ -251,14 +255,85 @@ pub struct CacheArguments {
 }
 
 /// What `topipe cache` can do.
-#[derive(Debug, Clone, Copy, Subcommand)]
+#[derive(Debug, Clone, Subcommand)]
 pub enum CacheCommand {
-    /// List the results that are kept.
-    Ls,
-    /// Say how much room they take.
+    /// List the results that are kept, or with --runs the runs that are remembered.
+    Ls {
+        /// List runs.
+        #[arg(long)]
+        runs: bool,
+    },
+    /// Say how much room everything takes.
     Du,
     /// Check every file against its hash; move aside what does not verify.
     Verify,
+    /// Say what could be thrown away, and which runs it would hurt; with --delete, do it.
+    Gc {
+        /// At most so much may stay: "500MB", "2GB".
+        #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+        max_size: Option<u64>,
+        /// Nothing that was last used longer ago may stay: "30d", "12h".
+        #[arg(long, value_name = "TIME", value_parser = parse_age)]
+        max_age: Option<Duration>,
+        /// Throw it away.
+        #[arg(long)]
+        delete: bool,
+        /// The plan as one JSON object.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Keep the results of a run whatever gc is told.
+    Pin {
+        /// The run: the beginning of its name in `cache ls --runs`, its run.json, or its output folder.
+        run: String,
+        /// No longer.
+        #[arg(long)]
+        remove: bool,
+    },
+}
+
+fn parse_size(text: &str) -> Result<u64, String> {
+    let units = [("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3), ("B", 1.0)];
+    let (number, unit) =
+        units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit))).unwrap_or((text, 1.0));
+    match number.trim().parse::<f64>() {
+        Ok(number) if number >= 0.0 && number.is_finite() => Ok((number * unit) as u64),
+        _ => Err("not a size; use a number and B, kB, MB, GB or TB".into()),
+    }
+}
+
+fn parse_age(text: &str) -> Result<Duration, String> {
+    let units = [('d', 86_400.0), ('h', 3600.0), ('m', 60.0), ('s', 1.0)];
+    let seconds = units
+        .iter()
+        .find_map(|(name, unit)| Some(text.strip_suffix(*name)?.trim().parse::<f64>().ok()? * unit))
+        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    seconds.ok_or_else(|| "not a time; use a number and d, h, m or s".into())
+}
+
+/// `topipe diff`.
+#[derive(Debug, Args)]
+pub struct DiffArguments {
+    /// A run: its run.json, its output folder, or the beginning of its name in `cache ls --runs`.
+    pub before: String,
+    /// The run to compare it with.
+    pub after: String,
+    /// The cache in which runs are looked up and figures are found.
+    #[arg(long, env = "TOPIPE_CACHE", value_name = "DIR", default_value = ".topipe")]
+    pub cache: PathBuf,
+    /// The differences as one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `topipe log`.
+#[derive(Debug, Args)]
+pub struct LogArguments {
+    /// The pipeline.
+    #[command(flatten)]
+    pub pipeline: PipelineArguments,
+    /// Only this stage.
+    pub stage: Option<String>,
 }
 
 /// `topipe new`.

@@ -25,6 +25,16 @@ pub(crate) fn duration(seconds: f64) -> String {
     }
 }
 
+/// "5 min", "3 h", "12 d".
+pub(crate) fn span(time: Duration) -> String {
+    match time.as_secs() {
+        s if s < 120 => format!("{s} s"),
+        s if s < 7200 => format!("{} min", s / 60),
+        s if s < 172_800 => format!("{} h", s / 3600),
+        s => format!("{} d", s / 86_400),
+    }
+}
+
 /// "12 B", "3.4 MB".
 pub(crate) fn size(bytes: u64) -> String {
     let mut value = bytes as f64;
@@ -100,6 +110,11 @@ impl EventSink for Console {
                     Verbosity::Normal,
                     &format!("{stage}: waiting for {holder}, which computes the same"),
                 );
+            }
+            Event::StageCached { stage, remarks, .. } => {
+                for text in remarks {
+                    self.line(Verbosity::Verbose, &format!("{stage}: {text}"));
+                }
             }
             Event::StageRemark { stage, text } => self.line(Verbosity::Verbose, &format!("{stage}: {text}")),
             Event::StageUnits { stage, reused, computed } => {

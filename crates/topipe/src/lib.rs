@@ -41,6 +41,8 @@ fn run(arguments: &Arguments) -> Result<topipe_engine::ExitCode, failure::Failur
         Command::Schema => commands::schema::run(),
         Command::Inspect(inspect) => commands::inspect::run(inspect),
         Command::Render(render) => commands::render::run(render),
+        Command::Diff(diff) => commands::diff::run(diff),
+        Command::Log(log) => commands::log::run(log),
         Command::Cache(cache) => commands::cache::run(cache),
         Command::New(new) => commands::new::run(new),
         Command::Completions { shell } => commands::completions::run(*shell),

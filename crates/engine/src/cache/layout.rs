@@ -23,13 +23,21 @@ pub enum Bucket {
     /// `units-v1/NAMESPACE/STAGE-KEY`: finished parts of stage runs, one file for each run that made any; the namespace is
     /// a hash of the kind of stage and its code version.
     Units,
+    /// `runs-v1/ab/cdef...`: records of runs, to name those that gc would hurt and to compare two; sealed JSON.
+    Runs,
+    /// `pins-v1/ab/cdef...`: the run with this identity is pinned; sealed JSON.
+    Pins,
+    /// `leases-v1/...`: what running processes use.
+    Leases,
+    /// `tmp/...`: files that are being written.
+    Temporary,
     /// `quarantine/`: files that did not verify, kept for a look.
     Quarantine,
 }
 
 impl Bucket {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 12] = [
         Self::Artifacts,
         Self::Keys,
         Self::Locks,
@@ -37,6 +45,10 @@ impl Bucket {
         Self::History,
         Self::Exports,
         Self::Units,
+        Self::Runs,
+        Self::Pins,
+        Self::Leases,
+        Self::Temporary,
         Self::Quarantine,
     ];
 
@@ -50,6 +62,10 @@ impl Bucket {
             Self::History => "history-v1",
             Self::Exports => "exports-v1",
             Self::Units => "units-v1",
+            Self::Runs => "runs-v1",
+            Self::Pins => "pins-v1",
+            Self::Leases => "leases-v1",
+            Self::Temporary => "tmp",
             Self::Quarantine => "quarantine",
         }
     }
@@ -60,7 +76,7 @@ impl Bucket {
         let hex = hash.to_hex();
         let folder = root.join(self.folder());
         match self {
-            Self::Locks | Self::Units | Self::Quarantine => folder.join(hex),
+            Self::Locks | Self::Units | Self::Leases | Self::Temporary | Self::Quarantine => folder.join(hex),
             _ => folder.join(&hex[..2]).join(&hex[2..]),
         }
     }

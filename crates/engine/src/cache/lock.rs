@@ -116,7 +116,7 @@ fn holder(file: &mut File) -> String {
 
 /// Whether `path` still names the file that was opened.
 #[cfg(unix)]
-fn is_still_at(file: &File, path: &Path) -> bool {
+pub(super) fn is_still_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     match (file.metadata(), std::fs::metadata(path)) {
         (Ok(opened), Ok(named)) => opened.ino() == named.ino() && opened.dev() == named.dev(),
@@ -125,7 +125,7 @@ fn is_still_at(file: &File, path: &Path) -> bool {
 }
 
 #[cfg(not(unix))]
-fn is_still_at(_: &File, _: &Path) -> bool {
+pub(super) fn is_still_at(_: &File, _: &Path) -> bool {
     true
 }
 

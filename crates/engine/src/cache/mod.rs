@@ -6,16 +6,25 @@
 //! either a whole result or none.
 
 mod checkpoints;
+mod gc;
 mod layout;
+mod lease;
 mod lock;
+mod runs;
 mod seal;
 mod segment;
 mod store;
+mod temporary;
+mod verify;
 
 pub(crate) use checkpoints::UnitCheckpoints;
 pub use checkpoints::{UnitCounts, UnitsAtHand};
+pub use gc::{Collected, GcItem, GcLimits, GcPlan, GcReason, HurtRun};
 pub use layout::Bucket;
+pub(crate) use lease::Lease;
 pub use lock::{KeyLock, LockError};
+pub use runs::KeptRun;
 pub(crate) use seal::{seal, unseal};
-pub(crate) use store::persist;
-pub use store::{Cache, CacheError, Damage, KeyRecord, StoredArtifact, Usage, write_atomically};
+pub use store::{Cache, CacheError, Damage, KeyRecord, StoredArtifact, Usage};
+pub use temporary::write_atomically;
+pub(crate) use temporary::{Durability, Temporary, sweep};

@@ -1,6 +1,6 @@
 //! Reading and writing the cache.
 
-use super::{Bucket, KeyLock, LockError, seal, unseal};
+use super::{Bucket, Durability, KeyLock, Lease, LockError, Temporary, seal, unseal};
 use crate::artifact::{ArtifactType, Value};
 use crate::codec;
 use crate::hash::{ContentHash, FieldHasher};
@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 /// The cache, or a file beside it, could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -115,23 +115,30 @@ impl Cache {
         damages: &mut Vec<Damage>,
     ) -> Result<Option<KeyRecord>, CacheError> {
         let path = self.path(Bucket::Keys, key);
-        let Some(bytes) = read_if_there(&path)? else { return Ok(None) };
-        let record = unseal::<KeyRecord>(&bytes).map_err(|error| error.to_string()).and_then(|record| {
-            if record.key == key { Ok(record) } else { Err("it is the record of another key".into()) }
-        });
-        match record {
-            Ok(record) => Ok(Some(record)),
-            Err(reason) => {
-                damages.push(self.quarantine(&path, reason));
+        match self.read_sealed::<KeyRecord>(&path, damages)? {
+            Some(record) if record.key != key => {
+                damages.push(self.quarantine(&path, "it is the record of another key"));
                 Ok(None)
             }
+            record => Ok(record),
         }
+    }
+
+    /// How long ago the result of a key was used last, to the hour.
+    pub fn last_use(&self, key: ContentHash) -> Duration {
+        let modified = self.path(Bucket::Keys, key).metadata().and_then(|data| data.modified());
+        modified.ok().and_then(|last| SystemTime::now().duration_since(last).ok()).unwrap_or_default()
+    }
+
+    /// Marks the result of a key as used now.
+    pub(crate) fn touch(&self, key: ContentHash) {
+        touch(&self.path(Bucket::Keys, key));
     }
 
     /// Publishes the record of a key. Its artifact must be stored already.
     pub fn publish(&self, record: &KeyRecord) -> Result<(), CacheError> {
         let bytes = seal(record).map_err(|error| CacheError::Record(error.to_string()))?;
-        write_atomically(&self.path(Bucket::Keys, record.key), &bytes)?;
+        self.write(&self.path(Bucket::Keys, record.key), &bytes, Durability::Flushed)?;
         crate::failpoint::pass("key published");
         Ok(())
     }
@@ -150,19 +157,38 @@ impl Cache {
         }
     }
 
-    /// Stores an artifact.
-    pub fn store(&self, artifact: &ArtifactType, value: &Value) -> Result<StoredArtifact, CacheError> {
+    /// Writes a file of the cache so that it appears in one step.
+    fn write(&self, path: &Path, bytes: &[u8], durability: Durability) -> Result<(), CacheError> {
+        let write = || {
+            let mut file = Temporary::new(&self.root.join(Bucket::Temporary.folder()))?;
+            file.write_all(bytes)?;
+            if let Some(folder) = path.parent() {
+                std::fs::create_dir_all(folder)?;
+            }
+            file.persist(path, durability)
+        };
+        write().map_err(|error| CacheError::io("write", path, error))
+    }
+
+    /// Stores an artifact and keeps it with `lease`.
+    pub(crate) fn store(
+        &self,
+        artifact: &ArtifactType,
+        value: &Value,
+        lease: &Lease,
+    ) -> Result<StoredArtifact, CacheError> {
         let file = artifact.encode(value)?;
         let hash = match codec::open(&file) {
             Ok((header, _)) => header.identity(),
             Err(error) => return Err(CacheError::Record(error.to_string())),
         };
+        lease.hold(&[hash]);
         let path = self.path(Bucket::Artifacts, hash);
         // Equal content is there already as a rule; a damaged file is replaced.
         if std::fs::read(&path).is_ok_and(|old| old == file) {
             return Ok(StoredArtifact { hash, bytes: file.len() as u64 });
         }
-        write_atomically(&path, &file)?;
+        self.write(&path, &file, Durability::Flushed)?;
         crate::failpoint::pass("artifact stored");
         Ok(StoredArtifact { hash, bytes: file.len() as u64 })
     }
@@ -198,17 +224,35 @@ impl Cache {
 
     /// A sealed record of one of the other buckets, under the hash of `name`. Damage counts as no record.
     pub(crate) fn read_record<T: DeserializeOwned>(&self, bucket: Bucket, name: &str) -> Option<T> {
-        let path = self.path(bucket, record_hash(name));
-        let bytes = std::fs::read(&path).ok()?;
+        let mut damages = Vec::new();
+        // These records only save time or explain: their loss changes no result.
+        let value = self.read_sealed(&self.path(bucket, record_hash(name)), &mut damages).ok().flatten();
+        for damage in damages {
+            tracing::warn!("{}: {}; moved aside", damage.path.display(), damage.reason);
+        }
+        value
+    }
+
+    /// A sealed record. Damage is moved aside and counts as no record.
+    pub(super) fn read_sealed<T: DeserializeOwned>(
+        &self,
+        path: &Path,
+        damages: &mut Vec<Damage>,
+    ) -> Result<Option<T>, CacheError> {
+        let Some(bytes) = read_if_there(path)? else { return Ok(None) };
         match unseal(&bytes) {
-            Ok(value) => Some(value),
+            Ok(value) => Ok(Some(value)),
             Err(error) => {
-                // These records only save time or explain: their loss changes no result.
-                let damage = self.quarantine(&path, error.to_string());
-                tracing::warn!("{}: {}; moved aside", damage.path.display(), damage.reason);
-                None
+                damages.push(self.quarantine(path, error.to_string()));
+                Ok(None)
             }
         }
+    }
+
+    /// Writes a sealed record whose loss costs next to nothing.
+    pub(super) fn write_sealed<T: Serialize>(&self, path: &Path, value: &T) -> Result<(), CacheError> {
+        let bytes = seal(value).map_err(|error| CacheError::Record(error.to_string()))?;
+        self.write(path, &bytes, Durability::Unflushed)
     }
 
     /// Writes such a record.
@@ -218,8 +262,7 @@ impl Cache {
         name: &str,
         value: &T,
     ) -> Result<(), CacheError> {
-        let bytes = seal(value).map_err(|error| CacheError::Record(error.to_string()))?;
-        write_atomically(&self.path(bucket, record_hash(name)), &bytes)
+        self.write_sealed(&self.path(bucket, record_hash(name)), value)
     }
 
     /// Moves a file out of the way.
@@ -270,53 +313,16 @@ impl Cache {
         }
         Ok(records)
     }
-
-    /// Verifies every artifact and every record, and moves aside what does not verify. Returns how many files were
-    /// good, and the damages.
-    pub fn verify(&self) -> Result<(u64, Vec<Damage>), CacheError> {
-        let mut good = 0;
-        let mut damages = Vec::new();
-        for path in self.files(Bucket::Artifacts)? {
-            let Some(bytes) = read_if_there(&path)? else { continue };
-            let verified = match hash_of_path(&path) {
-                Some(hash) => verify(&bytes, hash),
-                None if is_temporary(&path) => continue,
-                None => Err("its name is not a hash".into()),
-            };
-            match verified {
-                Ok(()) => good += 1,
-                Err(reason) => damages.push(self.quarantine(&path, reason)),
-            }
-        }
-        for path in self.files(Bucket::Units)? {
-            match Self::verify_units(&path) {
-                Ok(()) => good += 1,
-                Err(reason) => damages.push(self.quarantine(&path, reason)),
-            }
-        }
-        let records = self.records(&mut damages)?;
-        for record in records {
-            if self.path(Bucket::Artifacts, record.artifact).exists() {
-                good += 1;
-            } else {
-                let path = self.path(Bucket::Keys, record.key);
-                damages.push(
-                    self.quarantine(&path, format!("its artifact {} is not there", record.artifact.short())),
-                );
-            }
-        }
-        Ok((good, damages))
-    }
 }
 
 /// Whether the bytes are the artifact with this identity.
-fn verify(bytes: &[u8], hash: ContentHash) -> Result<(), String> {
+pub(super) fn verify(bytes: &[u8], hash: ContentHash) -> Result<(), String> {
     let (header, _) = codec::open(bytes).map_err(|error| error.to_string())?;
     if header.identity() == hash { Ok(()) } else { Err("it is another artifact than its name says".into()) }
 }
 
 /// The hash in the path of a file in a sharded bucket.
-fn hash_of_path(path: &Path) -> Option<ContentHash> {
+pub(super) fn hash_of_path(path: &Path) -> Option<ContentHash> {
     let name = path.file_name()?.to_str()?;
     let shard = path.parent()?.file_name()?.to_str()?;
     format!("{shard}{name}").parse().ok()
@@ -326,7 +332,7 @@ fn record_hash(name: &str) -> ContentHash {
     FieldHasher::new("topipe record name 1").text(name).finish()
 }
 
-fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, CacheError> {
+pub(super) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, CacheError> {
     match std::fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
@@ -351,35 +357,20 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), CacheError> {
     Ok(())
 }
 
-const TEMPORARY: &str = ".topipe-";
+/// Uses within this time count as one, so that a run with nothing to do writes nothing.
+const SAME_USE: Duration = Duration::from_secs(3600);
 
-fn is_temporary(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(TEMPORARY))
-}
-
-/// Writes a file so that it appears in one step, whole: beside its place, flushed to the disk, then renamed.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), CacheError> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let fail = |error| CacheError::io("write", path, error);
-    std::fs::create_dir_all(folder).map_err(fail)?;
-    let mut file = tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder).map_err(fail)?;
-    file.write_all(bytes).map_err(fail)?;
-    persist(file, path)
-}
-
-/// Flushes a temporary file and gives it its name, readable as any other file.
-pub(crate) fn persist(file: tempfile::NamedTempFile, path: &Path) -> Result<(), CacheError> {
-    let fail = |error| CacheError::io("write", path, error);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // Temporary files are private; what is shared should not be.
-        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(fail)?;
+/// Marks a file as used now; false if it is not there.
+pub(super) fn touch(path: &Path) -> bool {
+    let Ok(metadata) = std::fs::metadata(path) else { return false };
+    let now = SystemTime::now();
+    let recent = metadata.modified().is_ok_and(|last| {
+        // A time in the future is one too: the clock was set back.
+        now.duration_since(last).is_ok_and(|since| since < SAME_USE)
+    });
+    if !recent && let Ok(file) = std::fs::File::options().append(true).open(path) {
+        // It only guides what is thrown away first.
+        let _ = file.set_modified(now);
     }
-    crate::failpoint::pass("temporary written");
-    file.as_file().sync_data().map_err(fail)?;
-    crate::failpoint::pass("temporary flushed");
-    file.persist(path).map_err(|error| fail(error.error))?;
-    crate::failpoint::pass("file renamed");
-    Ok(())
+    true
 }

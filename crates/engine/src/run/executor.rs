@@ -222,10 +222,12 @@ impl<'a> Executor<'a> {
     }
 
     fn found(&self, stage: usize, record: KeyRecord) {
+        self.cache().touch(record.key);
         self.events.emit(&Event::StageCached {
             stage: self.node(stage).name.clone(),
             key: record.key,
             artifact: record.artifact,
+            remarks: record.remarks.clone(),
         });
         let mut slot = lock(&self.slots[stage]);
         slot.outcome = Some(Outcome::Cached);
@@ -300,7 +302,10 @@ impl<'a> Executor<'a> {
             .inputs
             .iter()
             .map(|(&port, &from)| {
-                (port, InputRecord { stage: self.node(from).name.clone(), artifact: self.artifact(from) })
+                (
+                    port.to_owned(),
+                    InputRecord { stage: self.node(from).name.clone(), artifact: self.artifact(from) },
+                )
             })
             .collect();
         let files = self
@@ -326,7 +331,7 @@ impl<'a> Executor<'a> {
             files,
             key: slot.key,
             artifact: record.as_ref().map(|record| record.artifact),
-            artifact_kind: node.stage.output().name,
+            artifact_kind: node.stage.output().name.to_owned(),
             bytes: record.as_ref().map(|record| record.bytes),
             seconds: record.as_ref().map(|record| record.seconds),
             remarks: record.map(|record| record.remarks).unwrap_or_default(),

@@ -3,18 +3,18 @@
 use super::executor::Executor;
 use super::failure::Failure;
 use super::{ExportOutcome, ExportRecord};
-use crate::cache::{Bucket, CacheError, persist};
+use crate::cache::{Bucket, CacheError, Durability, Temporary};
 use crate::error::ExitCode;
 use crate::event::Event;
 use crate::hash::ContentHash;
 use crate::input_file::{FileMemo, hash_with_memo};
 use crate::registry::ExportError;
-use crate::spec::ExportNode;
+use crate::spec::{ExportNode, Pipeline};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::panic::AssertUnwindSafe;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What was last written into an output folder, by file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -28,6 +28,17 @@ struct WrittenFile {
     content: ContentHash,
     bytes: u64,
     memo: Option<FileMemo>,
+}
+
+/// Removes what dead processes have left in the folders of the exports.
+pub(super) fn sweep(pipeline: &Pipeline, out: &Path) {
+    let mut folders: Vec<PathBuf> = vec![out.to_owned()];
+    folders.extend(
+        pipeline.exports.iter().filter_map(|export| Some(out.join(&export.file).parent()?.to_owned())),
+    );
+    folders.sort();
+    folders.dedup();
+    folders.iter().for_each(|folder| crate::cache::sweep(folder));
 }
 
 /// Writes the exports of the stages that have a result, in the order of the spec.
@@ -112,9 +123,7 @@ fn write(
 ) -> Result<WrittenFile, Failure> {
     let value = executor.obtain(export.stage)?;
     let fail = |error| Failure::from(CacheError::io("write", path, error));
-    let folder = path.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder).map_err(fail)?;
-    let temporary = tempfile::Builder::new().prefix(".topipe-").tempfile_in(folder).map_err(fail)?;
+    let temporary = Temporary::beside(path).map_err(fail)?;
     let title = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let mut file = HashingFile { file: BufWriter::new(temporary), hasher: blake3::Hasher::new(), bytes: 0 };
     let result =
@@ -134,7 +143,7 @@ fn write(
     let content = ContentHash::from_bytes(*file.hasher.finalize().as_bytes());
     let bytes = file.bytes;
     let temporary = file.file.into_inner().map_err(|error| fail(error.into_error()))?;
-    persist(temporary, path)?;
+    temporary.persist(path, Durability::Flushed).map_err(fail)?;
     crate::failpoint::pass("export written");
     let writer = export.exporter.code_version.clone();
     Ok(WrittenFile { artifact, writer, content, bytes, memo: None })

@@ -11,7 +11,7 @@ pub use record::{
     ExportOutcome, ExportRecord, FileRecord, InputRecord, Machine, Outcome, RunRecord, StageRecord,
 };
 
-use crate::cache::{Cache, CacheError};
+use crate::cache::{Cache, CacheError, Lease};
 use crate::decide::Decider;
 use crate::error::ExitCode;
 use crate::event::{Event, EventSink};
@@ -79,10 +79,14 @@ pub fn run(
     let start = Instant::now();
     let started = SystemTime::now();
     let selection = Selection::new(pipeline, &options.choice).map_err(EngineError::Argument)?;
-    let decider = Decider::new(pipeline, cache, &selection)?;
+    let mut decider = Decider::new(pipeline, cache, &selection)?;
     // Found out now rather than after an hour of computing.
     std::fs::create_dir_all(&options.out)
         .map_err(|error| CacheError::io("make the folder", &options.out, error))?;
+
+    cache.sweep();
+    export::sweep(pipeline, &options.out);
+    decider.lease = Some(Lease::new(cache));
 
     let events = Arc::new(Events { sink: Mutex::new(sink) });
     let order: Vec<usize> =
@@ -113,6 +117,9 @@ pub fn run(
         exports,
     };
     record.write(&options.out)?;
+    if let Err(error) = cache.keep_run(&record) {
+        tracing::debug!("the run is not remembered: {error}");
+    }
     events.emit(&Event::RunFinished { code, seconds });
     Ok(record)
 }

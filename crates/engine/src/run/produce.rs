@@ -4,7 +4,7 @@ use super::executor::{Executor, lock};
 use super::failure::Failure;
 use super::listener::StageListener;
 use crate::artifact::Value;
-use crate::cache::{KeyRecord, UnitCheckpoints, UnitCounts};
+use crate::cache::{CacheError, KeyRecord, Lease, StoredArtifact, UnitCheckpoints, UnitCounts};
 use crate::error::ExitCode;
 use crate::event::Event;
 use crate::hash::ContentHash;
@@ -83,7 +83,7 @@ impl Executor<'_> {
             Err(payload) => return Err(panicked(payload.as_ref()).into()),
         };
         let seconds = start.elapsed().as_secs_f64();
-        let stored = self.cache().store(&node.stage.output(), &value)?;
+        let stored = self.store(stage, key, &value)?;
         let record = KeyRecord {
             key,
             kind: node.stage.kind().to_owned(),
@@ -98,6 +98,18 @@ impl Executor<'_> {
         }
         self.cache().publish(&record)?;
         Ok(Settled::Produced(Produced { value, record, units }))
+    }
+
+    fn store(&self, stage: usize, key: ContentHash, value: &Value) -> Result<StoredArtifact, CacheError> {
+        let (cache, output) = (self.cache(), self.node(stage).stage.output());
+        match &self.decider.lease {
+            Some(lease) => {
+                // A forced stage has not been looked up.
+                lease.hold(&[key]);
+                cache.store(&output, value, lease)
+            }
+            None => cache.store(&output, value, &Lease::new(cache)),
+        }
     }
 
     /// The result of a stage that has been settled: from memory, from the cache, or, if it is damaged or gone there,

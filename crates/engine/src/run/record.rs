@@ -1,18 +1,18 @@
 //! `run.json`: enough to repeat a run and to compare two.
 
-use crate::cache::{CacheError, UnitCounts};
+use crate::cache::{CacheError, Durability, Temporary, UnitCounts};
 use crate::error::ExitCode;
 use crate::hash::ContentHash;
 use crate::machine;
 use crate::reason::Reason;
 use crate::spec::RUN_RECORD;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The record of one run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunRecord {
     /// Name and version of the program.
     pub program: String,
@@ -37,14 +37,14 @@ pub struct RunRecord {
 }
 
 /// Where a run took place.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Machine {
     /// Its name.
     pub host: String,
     /// Operating system.
-    pub os: &'static str,
+    pub os: String,
     /// Instruction set.
-    pub arch: &'static str,
+    pub arch: String,
     /// Threads of the pool inside of stages.
     pub threads: usize,
     /// Stages at the same time.
@@ -57,8 +57,8 @@ impl Machine {
     pub(super) fn here(jobs: usize) -> Self {
         Self {
             host: machine::host(),
-            os: std::env::consts::OS,
-            arch: std::env::consts::ARCH,
+            os: std::env::consts::OS.into(),
+            arch: std::env::consts::ARCH.into(),
             threads: rayon::current_num_threads(),
             jobs,
             peak_memory_bytes: machine::peak_memory(),
@@ -67,7 +67,7 @@ impl Machine {
 }
 
 /// What became of a stage.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "outcome", rename_all = "kebab-case")]
 pub enum Outcome {
     /// It was computed in this run.
@@ -89,7 +89,7 @@ pub enum Outcome {
 }
 
 /// One stage of a run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StageRecord {
     /// Its name.
     pub stage: String,
@@ -105,7 +105,7 @@ pub struct StageRecord {
     /// All its parameters.
     pub parameters: serde_json::Value,
     /// Its inputs.
-    pub inputs: BTreeMap<&'static str, InputRecord>,
+    pub inputs: BTreeMap<String, InputRecord>,
     /// Its files.
     pub files: BTreeMap<String, FileRecord>,
     /// Its key.
@@ -113,7 +113,7 @@ pub struct StageRecord {
     /// Its artifact.
     pub artifact: Option<ContentHash>,
     /// The kind of its artifact.
-    pub artifact_kind: &'static str,
+    pub artifact_kind: String,
     /// Length of the artifact's file.
     pub bytes: Option<u64>,
     /// How long the computation took, now or, for a cached stage, when it was made; s.
@@ -127,7 +127,7 @@ pub struct StageRecord {
 }
 
 /// An input of a stage.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputRecord {
     /// The stage it comes from.
     pub stage: String,
@@ -136,7 +136,7 @@ pub struct InputRecord {
 }
 
 /// A file a stage reads.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileRecord {
     /// Where it is.
     pub path: PathBuf,
@@ -145,7 +145,7 @@ pub struct FileRecord {
 }
 
 /// What became of an export.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "outcome", rename_all = "kebab-case")]
 pub enum ExportOutcome {
     /// It was written.
@@ -164,7 +164,7 @@ pub enum ExportOutcome {
 }
 
 /// One export of a run.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ExportRecord {
     /// The file below the output folder.
     pub file: String,
@@ -187,14 +187,13 @@ impl RunRecord {
         let fail = |error| CacheError::io("write", &path, error);
         let text =
             serde_json::to_string_pretty(self).map_err(|error| CacheError::Record(error.to_string()))?;
-        let mut file = tempfile::Builder::new().prefix(".topipe-").tempfile_in(folder).map_err(fail)?;
-        file.write_all(text.as_bytes()).and_then(|()| file.write_all(b"\n")).map_err(fail)?;
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(fail)?;
-        }
-        file.persist(&path).map_err(|error| fail(error.error))?;
+        let write = || {
+            let mut file = Temporary::new(folder)?;
+            file.write_all(text.as_bytes())?;
+            file.write_all(b"\n")?;
+            file.persist(&path, Durability::Unflushed)
+        };
+        write().map_err(fail)?;
         crate::failpoint::pass("run record written");
         Ok(())
     }

@@ -6,6 +6,7 @@ mod child;
 mod concurrency;
 mod exports;
 mod failures;
+mod gc;
 mod keys;
 mod schema;
 mod selection;

@@ -2,13 +2,16 @@
 
 pub(crate) mod cache;
 pub(crate) mod completions;
+pub(crate) mod diff;
 pub(crate) mod graph;
 pub(crate) mod inspect;
 pub(crate) mod kinds;
+pub(crate) mod log;
 pub(crate) mod new;
 pub(crate) mod plan;
 pub(crate) mod render;
 pub(crate) mod run;
+mod runs;
 pub(crate) mod schema;
 mod target;
 
