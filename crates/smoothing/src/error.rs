@@ -20,6 +20,14 @@ pub enum SmoothingError {
         /// Why, and who says so.
         source_of_range: &'static str,
     },
+    /// What the engineer says about features does not fit the part.
+    #[error("entry {entry} of `features`: {problem}")]
+    Feature {
+        /// Which entry, from 1.
+        entry: usize,
+        /// What is wrong, and what is there instead.
+        problem: String,
+    },
     /// A coordinate is not a finite number.
     #[error(
         "vertex {vertex} has a coordinate that is not a finite number; repair the mesh before smoothing it"

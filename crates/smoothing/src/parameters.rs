@@ -1,6 +1,7 @@
 //! Parameters and their ranges.
 
 use crate::SmoothingError;
+use crate::features::FeatureOverride;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -131,6 +132,9 @@ pub struct Parameters {
     pub hole_tolerance: f64,
     /// Smallest dihedral angle of a sharp feature edge between two frozen faces, degrees.
     pub sharp_angle: f64,
+    /// Features to add, drop or pin, in this order: `{ action = "pin", shape = "hole", diameter = 6.0, space = { type =
+    /// "cylinder", point = [0, 0, 0], axis = [0, 0, 1], length = 12.0, diameter = 8.0 } }`.
+    pub features: Vec<FeatureOverride>,
 }
 
 impl Default for Parameters {
@@ -157,6 +161,7 @@ impl Default for Parameters {
             plane_area: 10.0,
             hole_tolerance: 0.05,
             sharp_angle: 30.0,
+            features: Vec::new(),
         }
     }
 }
@@ -278,6 +283,12 @@ impl Parameters {
             (20.0..=180.0).contains(&self.sharp_angle),
             "between 20 and 180",
             "degrees; below 20 an edge is no feature by the definition of the report",
-        )
+        )?;
+        for (k, entry) in self.features.iter().enumerate() {
+            if let Some(problem) = entry.problem() {
+                return Err(SmoothingError::Feature { entry: k + 1, problem });
+            }
+        }
+        Ok(())
     }
 }

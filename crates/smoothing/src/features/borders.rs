@@ -11,10 +11,13 @@
 //!
 //! Each step only takes facets away, so the rounds end.
 
-use topipe_mesh::{Connectivity, FaceId, TriangleMesh, VertexId};
+use topipe_mesh::{Connectivity, Design, FaceId, Part, TriangleMesh, VertexId};
 
 /// No region.
 pub(super) const NONE: u32 = u32::MAX;
+
+/// From this dihedral angle on a border is an edge of the shape: cosine of 20 degrees, as in the report.
+const SHARP: f64 = 0.9397;
 
 /// A connected piece of a region, for the decision whether it is large enough.
 #[derive(Debug, Clone, Copy, Default)]
@@ -27,30 +30,37 @@ pub(super) struct Piece {
     pub(super) border: f64,
     /// Length of the part of its border that it shares with other regions.
     pub(super) shared: f64,
+    /// Length of the part of its border with a dihedral angle of more than [`SHARP`].
+    pub(super) sharp: f64,
+    /// Area of its facets with a vertex inside the piece.
+    pub(super) core: f64,
+    /// Area of its non-design facets.
+    pub(super) non_design: f64,
 }
 
 /// Cleans `owner`, the region of each face or [`NONE`], and returns the region each remaining piece was part of;
-/// afterwards `owner` numbers pieces. Regions below `fixed` stay as they are, and are the first pieces.
+/// afterwards `owner` numbers pieces. Regions that are `fixed` stay whole and as they are.
 pub(super) fn clean(
-    mesh: &TriangleMesh,
+    part: &Part,
     connectivity: &Connectivity,
     owner: &mut [u32],
-    fixed: u32,
+    fixed: &[bool],
     large_enough: impl Fn(&Piece) -> bool,
 ) -> Vec<u32> {
-    let last = owner.iter().filter(|&&o| o != NONE).max().map_or(0, |o| o + 1);
-    let mut regions: Vec<u32> = (0..last.max(fixed)).collect();
+    let mesh = &part.mesh;
+    let mut regions: Vec<u32> = (0..fixed.len() as u32).collect();
     loop {
-        let pieces = split(mesh, connectivity, owner, &regions, fixed);
-        let kept: Vec<bool> = pieces.iter().map(|p| p.region < fixed || large_enough(p)).collect();
+        let pieces = split(part, connectivity, owner, &regions, fixed);
+        let stays: Vec<bool> = pieces.iter().map(|p| fixed[p.region as usize]).collect();
+        let kept: Vec<bool> = pieces.iter().zip(&stays).map(|(p, stays)| *stays || large_enough(p)).collect();
         let mut changed = kept.contains(&false);
         for o in owner.iter_mut().filter(|o| **o != NONE) {
             if !kept[*o as usize] {
                 *o = NONE;
             }
         }
-        changed |= open(mesh, owner, fixed);
-        changed |= part_pinches(mesh, connectivity, owner, fixed);
+        changed |= open(mesh, owner, &stays);
+        changed |= part_pinches(mesh, connectivity, owner, &stays);
         regions = pieces.iter().map(|p| p.region).collect();
         if !changed {
             return regions;
@@ -60,14 +70,22 @@ pub(super) fn clean(
 
 /// Numbers the connected pieces in `owner`, in the order of their first faces, and measures them.
 fn split(
-    mesh: &TriangleMesh,
+    part: &Part,
     connectivity: &Connectivity,
     owner: &mut [u32],
     regions: &[u32],
-    fixed: u32,
+    fixed: &[bool],
 ) -> Vec<Piece> {
-    let mut piece_of: Vec<u32> = owner.iter().map(|&o| if o < fixed { o } else { NONE }).collect();
-    let mut pieces: Vec<Piece> = (0..fixed).map(|region| Piece { region, ..Piece::default() }).collect();
+    let mesh = &part.mesh;
+    // The piece of each fixed region; they come first.
+    let mut whole = vec![NONE; fixed.len()];
+    let mut pieces: Vec<Piece> = Vec::new();
+    for region in (0..fixed.len()).filter(|&r| fixed[r]) {
+        whole[region] = pieces.len() as u32;
+        pieces.push(Piece { region: region as u32, ..Piece::default() });
+    }
+    let mut piece_of: Vec<u32> =
+        owner.iter().map(|&o| if o == NONE { NONE } else { whole[regions[o as usize] as usize] }).collect();
     let mut stack = Vec::new();
     for seed in mesh.faces() {
         if owner[seed.index()] == NONE || piece_of[seed.index()] != NONE {
@@ -78,7 +96,11 @@ fn split(
         piece_of[seed.index()] = id;
         stack.push(seed);
         while let Some(f) = stack.pop() {
-            piece.area += mesh.area_vector(f).length() / 2.0;
+            let area = mesh.area_vector(f).length() / 2.0;
+            piece.area += area;
+            if part.design[f.index()] == Design::NonDesign {
+                piece.non_design += area;
+            }
             for k in 0..3 {
                 let across = connectivity.neighbor(f, k);
                 let there = if across.is_some() { owner[across.index()] } else { NONE };
@@ -95,16 +117,34 @@ fn split(
                 if there != NONE {
                     piece.shared += length;
                 }
+                if !across.is_some() || mesh.normal(f).dot(mesh.normal(across)) < SHARP {
+                    piece.sharp += length;
+                }
             }
         }
         pieces.push(piece);
     }
     owner.copy_from_slice(&piece_of);
+    // Per vertex the piece of all its faces, or NONE.
+    let mut inside = vec![NONE; mesh.vertex_count()];
+    let mut mixed = vec![false; mesh.vertex_count()];
+    for (t, &o) in mesh.triangles.iter().zip(owner.iter()) {
+        for v in t {
+            mixed[v.index()] |= o == NONE || (inside[v.index()] != NONE && inside[v.index()] != o);
+            inside[v.index()] = o;
+        }
+    }
+    for f in mesh.faces() {
+        let o = owner[f.index()];
+        if o != NONE && mesh.triangles[f.index()].iter().any(|v| !mixed[v.index()]) {
+            pieces[o as usize].core += mesh.area_vector(f).length() / 2.0;
+        }
+    }
     pieces
 }
 
 /// Drops faces whose vertices all lie on the free surface.
-fn open(mesh: &TriangleMesh, owner: &mut [u32], fixed: u32) -> bool {
+fn open(mesh: &TriangleMesh, owner: &mut [u32], stays: &[bool]) -> bool {
     let mut free = vec![false; mesh.vertex_count()];
     for f in mesh.faces().filter(|f| owner[f.index()] == NONE) {
         mesh.triangles[f.index()].iter().for_each(|v| free[v.index()] = true);
@@ -113,7 +153,7 @@ fn open(mesh: &TriangleMesh, owner: &mut [u32], fixed: u32) -> bool {
     for f in mesh.faces() {
         let t = mesh.triangles[f.index()];
         let o = owner[f.index()];
-        if o != NONE && o >= fixed && t.iter().all(|v| free[v.index()]) {
+        if o != NONE && !stays[o as usize] && t.iter().all(|v| free[v.index()]) {
             owner[f.index()] = NONE;
             changed = true;
         }
@@ -154,7 +194,7 @@ fn runs(mesh: &TriangleMesh, connectivity: &Connectivity, owner: &[u32], v: Vert
 }
 
 /// Takes faces from the regions until no vertex joins two sectors of a region, or two of the free surface.
-fn part_pinches(mesh: &TriangleMesh, connectivity: &Connectivity, owner: &mut [u32], fixed: u32) -> bool {
+fn part_pinches(mesh: &TriangleMesh, connectivity: &Connectivity, owner: &mut [u32], stays: &[bool]) -> bool {
     let mut changed = false;
     for v in mesh.vertices() {
         let mut first = NONE;
@@ -171,7 +211,7 @@ fn part_pinches(mesh: &TriangleMesh, connectivity: &Connectivity, owner: &mut [u
         }
         loop {
             let around = runs(mesh, connectivity, owner, v);
-            let Some(least) = pinch(&around, fixed) else { break };
+            let Some(least) = pinch(&around, stays) else { break };
             for f in &around[least].faces {
                 owner[f.index()] = NONE;
             }
@@ -182,8 +222,8 @@ fn part_pinches(mesh: &TriangleMesh, connectivity: &Connectivity, owner: &mut [u
 }
 
 /// The run to give up, if two runs of one owner, or two runs of free faces, meet in the vertex.
-fn pinch(around: &[Run], fixed: u32) -> Option<usize> {
-    let may_go = |i: &usize| around[*i].owner != NONE && around[*i].owner >= fixed;
+fn pinch(around: &[Run], stays: &[bool]) -> Option<usize> {
+    let may_go = |i: &usize| around[*i].owner != NONE && !stays[around[*i].owner as usize];
     let twice = |o: u32| around.iter().filter(|r| r.owner == o).count() > 1;
     let smaller = |a: &usize, b: &usize| {
         around[*a].angle.total_cmp(&around[*b].angle).then(around[*a].faces.cmp(&around[*b].faces))

@@ -130,6 +130,19 @@ pub(super) fn shape(mesh: &TriangleMesh, cylinder: Cylinder, faces: &[FaceId], h
     RegionShape::Cylinder { point, axis, radius: cylinder.radius, hole }
 }
 
+/// The cylinder of least squares through faces that are known to be part of one, and whether it is a hole.
+pub(super) fn through(mesh: &TriangleMesh, faces: &[FaceId]) -> Option<(Cylinder, bool)> {
+    let mut moments = Symmetric::default();
+    for &f in faces {
+        moments.add(mesh.normal(f), mesh.area_vector(f).length());
+    }
+    let points = points(mesh, faces);
+    let cylinder = Cylinder::along(moments.eigen().1[0], &points)?.refine(&points, 20)?;
+    let outward: f64 =
+        faces.iter().map(|&f| mesh.area_vector(f).dot(cylinder.radial(mesh.centroid(f)))).sum();
+    Some((cylinder, outward < 0.0))
+}
+
 /// The distinct vertices of some faces.
 pub(super) fn points(mesh: &TriangleMesh, faces: &[FaceId]) -> Vec<DVec3> {
     let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| mesh.triangles[f.index()]).collect();
@@ -311,16 +324,11 @@ impl Search<'_> {
             .iter()
             .map(|&p| height(p))
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
-        let samples = |second: fn(f64) -> f64| -> Vec<[f64; 3]> {
-            points
-                .iter()
-                .map(|&p| {
-                    let t = 2.0 * (height(p) - low) / (high - low).max(f64::MIN_POSITIVE) - 1.0;
-                    [t, second(2.0 * angle(p)), cylinder.distance(p)]
-                })
-                .collect()
-        };
-        (!is_systematic(&samples(f64::cos)) && !is_systematic(&samples(f64::sin))).then_some(true)
+        let along = |p: DVec3| 2.0 * (height(p) - low) / (high - low).max(f64::MIN_POSITIVE) - 1.0;
+        let off = |p: DVec3| cylinder.distance(p);
+        let wrong = is_systematic(self.mesh, faces, off, |p| [along(p), (2.0 * angle(p)).cos()])
+            || is_systematic(self.mesh, faces, off, |p| [along(p), (2.0 * angle(p)).sin()]);
+        (!wrong).then_some(true)
     }
 }
 

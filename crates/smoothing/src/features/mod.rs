@@ -15,6 +15,7 @@ mod cylinder;
 mod edges;
 mod fit;
 mod noise;
+mod overrides;
 mod plane;
 
 use crate::{Method, Parameters, SmoothingError};
@@ -24,6 +25,8 @@ use topipe_mesh::{
 use topipe_progress::Progress;
 
 pub use edges::feature_edges;
+use overrides::Claims;
+pub use overrides::{Action, FeatureOverride, Shape, Space};
 
 /// What was found on a part.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,39 +75,51 @@ pub fn detect(
     }
     let tolerance = noise::tolerance(mesh, connectivity, parameters);
     // The regions a part comes with stay as they are: what follows looks at the other faces.
-    let given = part.regions.len() as u32;
-    let mut shapes: Vec<RegionShape> = part.regions.iter().map(|r| r.shape).collect();
-    let size = SizeRule::new(mesh, parameters);
-    let mut least: Vec<LeastArea> = vec![size.any; shapes.len()];
-    let mut owner: Vec<u32> = part.region_of_face.iter().map(|r| r.0).collect();
-    let mut claim = |shape, faces: &[FaceId], area, owner: &mut [u32]| {
-        faces.iter().for_each(|f| owner[f.index()] = shapes.len() as u32);
-        shapes.push(shape);
-        least.push(area);
+    let given = part.regions.len();
+    let mut claims = Claims {
+        shapes: part.regions.iter().map(|r| r.shape).collect(),
+        owner: part.region_of_face.iter().map(|r| r.0).collect(),
+        pinned: vec![true; given],
     };
-    let taken = |owner: &[u32]| -> Vec<bool> { owner.iter().map(|&o| o != borders::NONE).collect() };
+    let size = SizeRule::new(mesh, parameters);
+    let mut least: Vec<LeastArea> = vec![size.any; given];
+    let taken = |claims: &Claims| -> Vec<bool> { claims.owner.iter().map(|&o| o != borders::NONE).collect() };
     if parameters.detect_holes || parameters.detect_bosses {
-        let narrow = parameters.hole_tolerance;
-        for wall in cylinder::cylinders(mesh, connectivity, taken(&owner), narrow, tolerance, progress)? {
+        let (free, narrow) = (taken(&claims), parameters.hole_tolerance);
+        for wall in cylinder::cylinders(mesh, connectivity, free, narrow, tolerance, progress)? {
             let hole = matches!(wall.shape, RegionShape::Cylinder { hole: true, .. });
             if if hole { parameters.detect_holes } else { parameters.detect_bosses } {
-                let area = if wall.closed { size.any } else { size.arc };
-                claim(wall.shape, &wall.faces, area, &mut owner);
+                claims.claim(wall.shape, &wall.faces);
+                least.push(if wall.closed { size.any } else { size.arc });
             }
         }
     }
     if parameters.detect_planes {
-        let smallest = size.plane.enclosed;
-        for (shape, faces) in plane::planes(mesh, connectivity, taken(&owner), tolerance, smallest, progress)?
-        {
-            claim(shape, &faces, size.plane, &mut owner);
+        let (free, smallest) = (taken(&claims), size.plane.vouched);
+        for flat in plane::planes(mesh, connectivity, free, tolerance, smallest, progress)? {
+            claims.claim(flat.shape, &flat.faces);
+            least.push(if flat.exact { size.plane } else { size.rough_plane });
         }
     }
-    let origin = borders::clean(mesh, connectivity, &mut owner, given, |piece| {
-        least[piece.region as usize].accepts(piece)
-    });
-    let features = assemble(part, connectivity, parameters, &shapes, &owner, &origin, given);
-    Ok(features)
+    overrides::apply(part, connectivity, &parameters.features, tolerance, &mut claims)?;
+    least.resize(claims.shapes.len(), size.any);
+    let accepts = |piece: &borders::Piece| {
+        claims.pinned[piece.region as usize] || least[piece.region as usize].accepts(piece)
+    };
+    let mut fixed: Vec<bool> = (0..claims.shapes.len()).map(|r| r < given).collect();
+    let (owner, origin) = loop {
+        let mut owner = claims.owner.clone();
+        let origin = borders::clean(part, connectivity, &mut owner, &fixed, accepts);
+        // A pinned region without a vertex inside it has no clean border: it is kept as it is.
+        let mut kept: Vec<bool> = fixed.clone();
+        owner.iter().filter(|o| **o != borders::NONE).for_each(|o| kept[origin[*o as usize] as usize] = true);
+        let lost: Vec<usize> = (0..kept.len()).filter(|&r| claims.pinned[r] && !kept[r]).collect();
+        if lost.is_empty() {
+            break (owner, origin);
+        }
+        lost.into_iter().for_each(|r| fixed[r] = true);
+    };
+    Ok(assemble(part, connectivity, parameters, &claims.shapes, &owner, &origin, given as u32))
 }
 
 /// The smallest area of a region, mm^2.
@@ -112,30 +127,44 @@ pub fn detect(
 struct LeastArea {
     /// Amid the free surface.
     alone: f64,
-    /// Where most of its border is shared with other regions.
-    enclosed: f64,
+    /// Where the engineer says that it is a face of the design, by a label, or other regions around it do.
+    vouched: f64,
+    /// Whether a strip without a vertex inside must have sharp edges: the facets of a fine cylinder have none.
+    strips_are_sharp: bool,
 }
 
 impl LeastArea {
     fn accepts(self, piece: &borders::Piece) -> bool {
-        piece.area >= self.alone
-            || (piece.area >= self.enclosed && piece.shared >= ENCLOSED_SHARE * piece.border)
+        let vouched =
+            piece.shared >= VOUCHED_SHARE * piece.border || piece.non_design >= VOUCHED_SHARE * piece.area;
+        let large = piece.area >= self.alone || (vouched && piece.area >= self.vouched);
+        let strip = piece.core < STRIP_CORE * piece.area;
+        large && !(self.strips_are_sharp && strip && piece.sharp < STRIP_SHARP * piece.border)
     }
 }
 
 /// Which pieces of a shape are large enough to be a region.
 struct SizeRule {
+    /// Most vertices lie in the plane to rounding.
     plane: LeastArea,
+    /// They do not.
+    rough_plane: LeastArea,
     arc: LeastArea,
     any: LeastArea,
 }
 
-/// Of the border of a piece that counts as enclosed by other regions.
-const ENCLOSED_SHARE: f64 = 0.5;
+/// Of the border, or of the area, of a piece that others vouch for.
+const VOUCHED_SHARE: f64 = 0.5;
 
-/// The part of `plane_area` that is asked of an enclosed piece: the strip between a boss and the oblique side it
+/// A piece with less than this share of its area around vertices inside it is a strip.
+const STRIP_CORE: f64 = 0.5;
+
+/// The share of its border at which a strip must have a dihedral angle.
+const STRIP_SHARP: f64 = 0.8;
+
+/// The part of `plane_area` that is asked of a piece that others vouch for: the strip between a boss and the oblique side it
 /// stands on is half an element wide, and still a face of the design.
-const ENCLOSED_AREA: f64 = 0.2;
+const VOUCHED_AREA: f64 = 0.2;
 
 /// The multiple of `plane_area` that is asked of an arc of a cylinder: five freedoms of a shape instead of three. On
 /// the reference parts smaller arcs are real, but one or two facets wide.
@@ -156,9 +185,10 @@ impl SizeRule {
             (factor * parameters.plane_area * edge * edge).max(LEAST_SHARE * area).min(LARGE_SHARE * area)
         };
         Self {
-            plane: LeastArea { alone: least(1.0), enclosed: least(ENCLOSED_AREA) },
-            arc: LeastArea { alone: least(ARC_AREA), enclosed: least(ARC_AREA) },
-            any: LeastArea { alone: 0.0, enclosed: 0.0 },
+            plane: LeastArea { alone: least(1.0), vouched: least(VOUCHED_AREA), strips_are_sharp: true },
+            rough_plane: LeastArea { alone: least(1.0), vouched: least(1.0), strips_are_sharp: true },
+            arc: LeastArea { alone: least(ARC_AREA), vouched: least(ARC_AREA), strips_are_sharp: false },
+            any: LeastArea { alone: 0.0, vouched: 0.0, strips_are_sharp: false },
         }
     }
 }

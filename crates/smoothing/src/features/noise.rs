@@ -2,7 +2,7 @@
 
 use crate::Parameters;
 use rayon::prelude::*;
-use topipe_mesh::{Connectivity, DVec3, TriangleMesh, VertexId};
+use topipe_mesh::{Connectivity, DVec3, FaceId, TriangleMesh, VertexId};
 
 /// The share of the vertices taken for smooth. On nine results from optimization 27 to 85 % of the vertices lie on
 /// exact shapes.
@@ -15,7 +15,14 @@ const SPREAD: f64 = 4.0;
 const LEAST_TOLERANCE: f64 = 0.01;
 
 /// With more noise than this a flat face can not be told from a bump.
-const MOST_TOLERANCE: f64 = 0.15;
+const MOST_TOLERANCE: f64 = 0.08;
+
+/// Correlation of neighbours' residuals from which on they follow a rule. White noise less a fitted plane has about
+/// 0; a cap of a sphere of eight edges' width 0.6, a wider one more.
+const ALIKE: f64 = 0.4;
+
+/// Share of the squares of residuals from which on they follow a polynomial. Six terms explain 6/n of white noise.
+const EXPLAINED: f64 = 0.5;
 
 /// What counts as being on a shape.
 #[derive(Debug, Clone, Copy)]
@@ -72,30 +79,44 @@ fn noise(mesh: &TriangleMesh, connectivity: &Connectivity) -> f64 {
     *heights.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
-/// True when more than half of the sum of squares of the residuals follows a polynomial of second order in two coordinates:
-/// then the shape is a wrong one, not a noisy one.
+/// True when the residuals follow a rule: then the shape is a wrong one, not a noisy one.
 ///
-/// `samples` are two coordinates of about unit size and a residual each.
-pub(super) fn is_systematic(samples: &[[f64; 3]]) -> bool {
+/// On a flat face with noise a residual says nothing about the next one; on a patch of a smooth surface nearly all of
+/// it. A strip of a sphere around a cylinder is too narrow for that, but its residuals are a polynomial of second order
+/// in the `coordinates`, which should be of about unit size.
+pub(super) fn is_systematic(
+    mesh: &TriangleMesh,
+    faces: &[FaceId],
+    residual: impl Fn(DVec3) -> f64,
+    coordinates: impl Fn(DVec3) -> [f64; 2],
+) -> bool {
     const TERMS: usize = 6;
-    if samples.len() < 3 * TERMS {
+    let (mut product, mut square, mut count) = (0.0, 0.0, 0.0);
+    let (mut m, mut b) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
+    for &f in faces {
+        let corners = mesh.corners(f);
+        let r = corners.map(&residual);
+        product += r[0] * r[1] + r[1] * r[2] + r[2] * r[0];
+        for k in 0..3 {
+            let [x, y] = coordinates(corners[k]);
+            let row = [1.0, x, y, x * x, x * y, y * y];
+            for i in 0..TERMS {
+                for j in 0..TERMS {
+                    m[i][j] += row[i] * row[j];
+                }
+                b[i] += row[i] * r[k];
+            }
+            square += r[k] * r[k];
+            count += 1.0;
+        }
+    }
+    if product > ALIKE * square {
+        return true;
+    }
+    if count < 9.0 * TERMS as f64 {
         return false;
     }
-    let n = samples.len() as f64;
-    let mut m = [[0.0; TERMS]; TERMS];
-    let mut b = [0.0; TERMS];
-    let mut total = 0.0;
-    for &[x, y, r] in samples {
-        let row = [1.0, x, y, x * x, x * y, y * y];
-        for i in 0..TERMS {
-            for j in 0..TERMS {
-                m[i][j] += row[i] * row[j] / n;
-            }
-            b[i] += row[i] * r;
-        }
-        total += r * r;
-    }
-    let Some(c) = super::fit::solve(m, b.map(|e| e / n)) else { return false };
-    let explained: f64 = c.iter().zip(b).map(|(c, b)| c * b).sum();
-    explained > 0.5 * total
+    let c = super::fit::solve(m.map(|row| row.map(|e| e / count)), b.map(|e| e / count));
+    let explained = c.map_or(0.0, |c| c.iter().zip(b).map(|(c, b)| c * b).sum::<f64>());
+    explained > EXPLAINED * square
 }

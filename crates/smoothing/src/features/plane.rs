@@ -20,6 +20,14 @@ const HIGHEST_STEP: f64 = 1.5;
 /// standard deviations.
 const OUTLIER: f64 = 5.0 * 1.4826;
 
+/// A flat patch that was found.
+pub(super) struct Flat {
+    pub(super) shape: RegionShape,
+    pub(super) faces: Vec<FaceId>,
+    /// True when most of its vertices lie in the plane to rounding.
+    pub(super) exact: bool,
+}
+
 struct Plane {
     point: DVec3,
     normal: DVec3,
@@ -48,7 +56,7 @@ pub(super) fn planes(
     tolerance: Tolerance,
     least_area: f64,
     progress: &Progress,
-) -> Result<Vec<(RegionShape, Vec<FaceId>)>, Interrupted> {
+) -> Result<Vec<Flat>, Interrupted> {
     let mut search = Search {
         mesh,
         connectivity,
@@ -73,16 +81,19 @@ pub(super) fn planes(
         for f in &faces {
             tried[f.index()] = true;
         }
-        if search.area(&faces) < least_area
-            || search.is_terrace(&plane, &faces)
-            || search.is_curved(&plane, &faces)
-        {
+        if search.area(&faces) < least_area || search.is_terrace(&plane, &faces) {
+            continue;
+        }
+        // Half of the vertices, not all: an isosurface rounds a flat face off where it ends.
+        let exact = search.median_distance(&plane, &faces) <= tolerance.rounding;
+        if !exact && search.is_curved(&plane, &faces) {
             continue;
         }
         for f in &faces {
             search.taken[f.index()] = true;
         }
-        found.push((RegionShape::Plane { point: plane.point, normal: plane.normal }, faces));
+        let shape = RegionShape::Plane { point: plane.point, normal: plane.normal };
+        found.push(Flat { shape, faces, exact });
     }
     Ok(found)
 }
@@ -163,12 +174,11 @@ impl Search<'_> {
     /// True when the facets bulge: part of a sphere, of a fine cylinder, of any smooth surface.
     fn is_curved(&self, plane: &Plane, faces: &[FaceId]) -> bool {
         let (u, v) = plane.normal.any_orthonormal_pair();
-        let corners = || faces.iter().flat_map(|&f| self.mesh.corners(f)).map(|p| p - plane.point);
-        let size = corners().map(|d| d.length()).fold(0.0, f64::max);
-        let samples: Vec<[f64; 3]> =
-            corners().map(|d| [d.dot(u) / size, d.dot(v) / size, d.dot(plane.normal)]).collect();
-        let rms = (samples.iter().map(|s| s[2] * s[2]).sum::<f64>() / samples.len() as f64).sqrt();
-        rms > self.tolerance.rounding && is_systematic(&samples)
+        let corners = || faces.iter().flat_map(|&f| self.mesh.corners(f));
+        let size = corners().map(|p| p.distance(plane.point)).fold(f64::MIN_POSITIVE, f64::max);
+        let height = |p: DVec3| plane.normal.dot(p - plane.point);
+        let place = |p: DVec3| [u.dot(p - plane.point) / size, v.dot(p - plane.point) / size];
+        is_systematic(self.mesh, faces, height, place)
     }
 
     fn grow(&mut self, plane: &mut Plane, seed: FaceId, limit: f64, refit: bool) -> Vec<FaceId> {

@@ -90,7 +90,9 @@ fn flat_faces_are_found_and_none_is_invented() {
         }
         for &(n, d, area) in &known {
             // Faces in pieces of a few facets, as y = 220 of monster-lite, are left to the labels.
-            if area < 60.0 * edge * edge {
+            let named = ["bracket", "support", "bell-crank", "beam-two-holes"].contains(&case);
+            // The one at z = 54 of the bracket is four slivers of 0.2 mm.
+            if area < if named { 5.0 } else { 60.0 } * edge * edge {
                 continue;
             }
             let covered: f64 = features
@@ -102,7 +104,10 @@ fn flat_faces_are_found_and_none_is_invented() {
                 })
                 .map(|r| r.area)
                 .sum();
-            assert!(covered > 0.75 * area, "{case}: {covered} of {area} mm2 found of {n} at {d}");
+            assert!(
+                covered > if named { 0.88 } else { 0.75 } * area,
+                "{case}: {covered} of {area} mm2 found of {n} at {d}"
+            );
         }
     }
 }
@@ -150,6 +155,97 @@ fn holes_survive_noise_on_the_free_surface() {
         let got = diameters(&found(&part).regions);
         assert_eq!(got.len(), wanted.len(), "{case}: {got:?}");
     }
+}
+
+#[test]
+fn bosses_of_the_bracket_are_those_of_its_design() {
+    // The outsides of its non-design cylinders, four of 16 mm about the bolts and two of 26 mm about the lug holes.
+    let features = found(&read("bracket"));
+    let mut bosses: Vec<f64> = features
+        .regions
+        .iter()
+        .filter_map(|r| match r.shape {
+            RegionShape::Cylinder { radius, hole: false, .. } => Some(2.0 * radius),
+            _ => None,
+        })
+        .collect();
+    bosses.sort_by(f64::total_cmp);
+    assert_eq!(bosses.len(), 6, "{bosses:?}");
+    for (got, wanted) in bosses.iter().zip([16.0, 16.0, 16.0, 16.0, 26.0, 26.0]) {
+        assert!((got / wanted - 1.0).abs() < 1e-6, "{got}");
+    }
+}
+
+#[test]
+fn every_cylinder_has_a_diameter_of_the_design() {
+    for case in ["bracket", "support", "bell-crank", "beam-two-holes"] {
+        let facts = facts(case);
+        let listed = |key: &str| -> Vec<f64> {
+            let list = if key == "add" { &facts["design_domain"]["add"] } else { &facts[key] };
+            list.as_array().expect("a list").iter().filter_map(|c| c["diameter"].as_f64()).collect()
+        };
+        let known = [listed("holes"), listed("non_design"), listed("add")].concat();
+        for region in &found(&read(case)).regions {
+            let RegionShape::Cylinder { radius, .. } = region.shape else { continue };
+            let real = known.iter().any(|d| (2.0 * radius / d - 1.0).abs() < 1e-5);
+            assert!(real, "{case}: no cylinder of the design has a diameter of {}", 2.0 * radius);
+        }
+    }
+}
+
+/// Each region is connected, its border simple closed loops, and no facet of it hangs out by two sides.
+#[test]
+fn borders_of_regions_are_clean() {
+    for case in CASES {
+        let part = read(case);
+        let connectivity = Connectivity::build(&part.mesh).expect("a manifold");
+        let features = found(&part);
+        let region = |f: topipe_mesh::FaceId| features.region_of_face[f.index()];
+        for f in part.mesh.faces().filter(|&f| region(f).is_some()) {
+            let free = (0..3).filter(|&k| !region(connectivity.neighbor(f, k)).is_some()).count();
+            assert!(free < 2, "{case}: {f:?} is a tongue");
+        }
+        for v in part.mesh.vertices() {
+            let around: Vec<_> = connectivity.outgoing(v).map(|h| region(h.face())).collect();
+            let starts = (0..around.len()).filter(|&k| around[k] != around[(k + 1) % around.len()]);
+            let mut runs: Vec<_> = starts.map(|k| around[k]).collect();
+            let count = runs.len();
+            runs.sort_unstable();
+            runs.dedup();
+            assert_eq!(runs.len(), count, "{case}: pinch at {v:?}");
+        }
+        let mut pieces = vec![0; features.regions.len()];
+        let mut seen = vec![false; part.mesh.face_count()];
+        for seed in part.mesh.faces().filter(|&f| region(f).is_some()) {
+            if seen[seed.index()] {
+                continue;
+            }
+            pieces[region(seed).index()] += 1;
+            let mut stack = vec![seed];
+            while let Some(f) = stack.pop() {
+                if std::mem::replace(&mut seen[f.index()], true) {
+                    continue;
+                }
+                stack.extend(
+                    (0..3).map(|k| connectivity.neighbor(f, k)).filter(|&g| region(g) == region(seed)),
+                );
+            }
+        }
+        assert!(pieces.iter().all(|&n| n == 1), "{case}: {pieces:?}");
+    }
+}
+
+#[test]
+fn pieces_of_one_plane_share_it_to_the_last_bit() {
+    let features = found(&read("bracket"));
+    let top: Vec<RegionShape> = features
+        .regions
+        .iter()
+        .map(|r| r.shape)
+        .filter(|s| matches!(s, RegionShape::Plane { point, normal } if normal.z > 0.999 && point.z < 13.0))
+        .collect();
+    assert_eq!(top.len(), 3);
+    assert!(top.iter().all(|s| *s == top[0]));
 }
 
 #[test]

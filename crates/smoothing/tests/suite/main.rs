@@ -5,6 +5,7 @@ mod detection;
 mod guarantees;
 mod invariance;
 mod methods;
+mod overrides;
 mod shapes;
 
 use std::path::PathBuf;

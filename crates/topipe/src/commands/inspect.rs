@@ -7,7 +7,7 @@ use crate::failure::Failure;
 use std::fmt::Write;
 use std::path::Path;
 use topipe_engine::{ArtifactKind, ExitCode, codec};
-use topipe_mesh::{Connectivity, Design, Part};
+use topipe_mesh::{Connectivity, Design, Part, RegionShape};
 
 pub(crate) fn run(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let (path, bytes) = super::target::read(&arguments.target)?;
@@ -99,8 +99,32 @@ fn describe_part(part: &Part) -> String {
         part.regions.len(),
         part.feature_edges.len()
     );
+    text += &describe_regions(part);
     for repair in &part.import.repairs {
         let _ = writeln!(text, "repaired: {} ({})", repair.what, repair.count);
+    }
+    text
+}
+
+/// The features, one line each, with what `features` in a pipeline needs to name them.
+fn describe_regions(part: &Part) -> String {
+    let mut text = String::new();
+    for (id, region) in part.regions.iter().enumerate() {
+        let shape = match region.shape {
+            RegionShape::Plane { point, normal } => {
+                format!("plane, normal ({normal:.4}) at {:.4} mm", normal.dot(point))
+            }
+            RegionShape::Cylinder { point, axis, radius, hole } => format!(
+                "{} of {:.4} mm, axis ({axis:.4}) through ({point:.3})",
+                if hole { "hole" } else { "boss" },
+                2.0 * radius
+            ),
+        };
+        let _ = writeln!(
+            text,
+            "region {id}: {shape}, {:.2} mm^2, within {:.1e} mm",
+            region.area, region.residual
+        );
     }
     text
 }

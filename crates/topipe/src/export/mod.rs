@@ -5,6 +5,7 @@ mod import;
 mod picture;
 mod quad_matching;
 mod skeleton;
+mod smoothing;
 mod spline_fit;
 mod validation;
 
@@ -14,6 +15,7 @@ use topipe_engine::Exporter;
 pub(crate) fn exporters() -> impl Iterator<Item = Exporter> {
     import::exporters()
         .into_iter()
+        .chain(smoothing::exporters())
         .chain(spline_fit::exporters())
         .chain(quad_matching::exporters())
         .chain(skeleton::exporters())

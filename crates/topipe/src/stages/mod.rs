@@ -52,6 +52,9 @@ mod tests {
             (Value::Array(_), _) if field.name == "non_design" => {
                 "[{ type = \"box\", min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }]".into()
             }
+            (Value::Array(_), _) if field.name == "features" => {
+                "[{ action = \"drop\", space = { type = \"non-design\" } }]".into()
+            }
             _ => panic!("say here what another value of {field:?} is"),
         }
     }

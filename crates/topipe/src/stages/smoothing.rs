@@ -26,6 +26,7 @@ impl Stage for Smoothing {
     fn check(&self, parameters: &Parameters) -> Result<(), BadValue> {
         parameters.check().map_err(|error| match &error {
             SmoothingError::Parameter { name, .. } => bad_value(name, &error),
+            SmoothingError::Feature { .. } => bad_value("features", &error),
             error => bad_value("", error),
         })
     }
