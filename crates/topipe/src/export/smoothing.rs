@@ -1,12 +1,11 @@
 //! The features of a smoothed part as a table.
 
 use crate::artifacts::Mesh;
-use std::io::Write;
 use topipe_engine::Exporter;
 use topipe_mesh::{Part, RegionShape};
 
 pub(super) fn exporters() -> Vec<Exporter> {
-    vec![Exporter::new::<Mesh>("csv", env!("TOPIPE_WRITER_SMOOTHING"), |part, _, mut file| {
+    vec![Exporter::new::<Mesh>("csv", env!("TOPIPE_WRITER_SMOOTHING"), |part, _, file| {
         Ok(file.write_all(table(part).as_bytes())?)
     })]
 }
