@@ -21,6 +21,9 @@ pub fn match_quads(
 ) -> Result<QuadLayout, QuadMatchingError> {
     parameters.validate()?;
     let tiles = tiling.tile_count();
+    if parameters.pairing == Pairing::Midpoint || tiling.bordered {
+        return crate::midpoint::subdivide(tiling, parameters, progress);
+    }
     if tiling.tile_of_face.len() != tiling.part.mesh.face_count() || tiling.anchors.len() != tiles {
         return Err(QuadMatchingError::Tiling("its arrays do not fit together".into()));
     }
@@ -50,7 +53,7 @@ pub fn match_quads(
             }
             partner
         }
-        Pairing::Refined => {
+        Pairing::Refined | Pairing::Midpoint => {
             let angles = surface_angles(&tiled, &sites, &triangles, &triangle_of_face);
             match_good_pairs(&sites, &triangles, &edges, &diagonals, &angles, parameters)
         }
@@ -108,7 +111,7 @@ pub fn match_quads(
             quad_of_face: regions.tiled.tile_of_face.clone(),
             tiled: regions.tiled,
         },
-        Pairing::Refined => refine(regions, parameters.snap, progress)?,
+        Pairing::Refined | Pairing::Midpoint => refine(regions, parameters.snap, progress)?,
     };
     let (part, _): (Part, Vec<FaceId>) = quads.tiled.refiner.finish();
     let mut layout = QuadLayout {

@@ -18,6 +18,8 @@ mod dual;
 mod error;
 mod layout;
 mod matching;
+mod midpoint;
+mod outlines;
 mod pairing;
 mod parameters;
 mod refine;

@@ -12,6 +12,9 @@ pub enum Pairing {
     /// three. No corner is forced to be reflex, no feature edge is given up.
     #[default]
     Refined,
+    /// Tiles themselves are subdivided from their centres to the middles of their sides. The only way for bordered
+    /// tiles.
+    Midpoint,
     /// Every triangle is paired (source, section 2.2): a quarter of the patches, at the price of some bad corners.
     Perfect,
 }

@@ -12,7 +12,8 @@ use std::collections::HashSet;
 use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
 use topipe_progress::Progress;
 
-/// A layout of regions with three or four sides, over the mesh of `tiled`, whose tiles are the regions.
+/// A layout of regions with three or more sides, over the mesh of `tiled`, whose tiles are the regions; faces of no tile
+/// (`u32::MAX`) belong to none.
 pub(crate) struct Regions {
     pub(crate) tiled: Tiled,
     pub(crate) vertices: Vec<VertexId>,
@@ -84,7 +85,9 @@ pub(crate) fn refine(regions: Regions, snap: f64, progress: &Progress) -> Result
 
     let mut faces: Vec<Vec<FaceId>> = vec![Vec::new(); sides.len()];
     for (f, &region) in tiled.tile_of_face.iter().enumerate() {
-        faces[region as usize].push(FaceId::new(f));
+        if let Some(faces) = faces.get_mut(region as usize) {
+            faces.push(FaceId::new(f));
+        }
     }
     let tasks: Vec<SpokeTask> = sides
         .iter()
@@ -177,7 +180,8 @@ fn flood(tiled: &Tiled, edges: &[MacroEdge], quads: &[[Side; 4]]) -> Result<Vec<
             }
         }
     }
-    match quad_of_face.iter().position(|&q| q == u32::MAX) {
+    let lost = |f: &usize| quad_of_face[*f] == u32::MAX && tiled.tile_of_face[*f] != u32::MAX;
+    match (0..quad_of_face.len()).find(lost) {
         Some(face) => Err(QuadMatchingError::Tiling(format!("face {face} lies in no quad"))),
         None => Ok(quad_of_face),
     }

@@ -1,33 +1,67 @@
 //! An independent check of a layout.
 
-use crate::QuadLayout;
+use crate::{QuadLayout, Side};
 use std::collections::{BTreeSet, HashMap};
 use topipe_mesh::{Connectivity, HalfEdgeId, VertexId};
 
 /// Checks what [`QuadLayout`] guarantees; an empty list means that all of it holds.
+///
+/// Faces are counted with their own Euler characteristic, found from the mesh: 1 for a disk, 0 for the wall of a hole,
+/// so that `V - E + F` has to be that of the mesh also where faces have more than one border.
 pub fn verify(layout: &QuadLayout) -> Vec<String> {
     let mesh = &layout.part.mesh;
     let connectivity = match Connectivity::build(mesh) {
         Ok(connectivity) => connectivity,
         Err(error) => return vec![error.to_string()],
     };
+    if layout.quad_of_face.len() != mesh.face_count() {
+        return vec!["it has not one quad per face of its mesh".into()];
+    }
+    let quads = layout.quads.len();
+    let name = |cell: usize| {
+        if cell < quads { format!("quad {cell}") } else { format!("region face {}", cell - quads) }
+    };
+    // Cells: the quads, then the region faces. The borders of each as closed chains of sides.
+    let borders: Vec<Vec<Vec<Side>>> = layout
+        .quads
+        .iter()
+        .map(|quad| vec![quad.to_vec()])
+        .chain(layout.region_faces.iter().map(|face| face.loops.clone()))
+        .collect();
+    let region_cell: HashMap<_, _> =
+        layout.region_faces.iter().enumerate().map(|(i, face)| (face.region, quads + i)).collect();
     let mut problems = Vec::new();
-    let mut uses = vec![[0u32; 2]; layout.edges.len()];
-    for (q, quad) in layout.quads.iter().enumerate() {
-        for k in 0..4 {
-            uses[quad[k].edge as usize][quad[k].reversed as usize] += 1;
-            let end = layout.edges[quad[k].edge as usize].ends[!quad[k].reversed as usize];
-            if end != layout.start(quad[(k + 1) % 4]) {
-                problems.push(format!("side {k} of quad {q} does not end where the next begins"));
-            }
+    let mut cell_of_face = vec![usize::MAX; mesh.face_count()];
+    for face in mesh.faces() {
+        let quad = layout.quad_of_face[face.index()];
+        let cell = if quad != QuadLayout::NO_QUAD {
+            Some(quad as usize).filter(|&q| q < quads)
+        } else {
+            region_cell.get(&layout.part.region_of_face[face.index()]).copied()
+        };
+        match cell {
+            Some(cell) => cell_of_face[face.index()] = cell,
+            None => return vec![format!("face {} lies in no quad and in no region face", face.0)],
         }
     }
-    // Which quad borders each directed mesh edge of a macro-edge.
-    let mut owner: HashMap<[VertexId; 2], u32> = HashMap::new();
-    for (q, quad) in layout.quads.iter().enumerate() {
-        for side in quad {
-            for pair in layout.path(*side).windows(2) {
-                owner.insert([pair[0], pair[1]], q as u32);
+
+    let mut uses = vec![[0u32; 2]; layout.edges.len()];
+    // Which cell borders each directed mesh edge of a macro-edge.
+    let mut owner: HashMap<[VertexId; 2], usize> = HashMap::new();
+    for (cell, loops) in borders.iter().enumerate() {
+        for sides in loops {
+            for (k, side) in sides.iter().enumerate() {
+                if side.edge as usize >= layout.edges.len() {
+                    return vec![format!("{} names an edge that does not exist", name(cell))];
+                }
+                uses[side.edge as usize][side.reversed as usize] += 1;
+                let end = layout.edges[side.edge as usize].ends[!side.reversed as usize];
+                if end != layout.start(sides[(k + 1) % sides.len()]) {
+                    problems.push(format!("side {k} of {} does not end where the next begins", name(cell)));
+                }
+                for pair in layout.path(*side).windows(2) {
+                    owner.insert([pair[0], pair[1]], cell);
+                }
             }
         }
     }
@@ -40,46 +74,69 @@ pub fn verify(layout: &QuadLayout) -> Vec<String> {
             problems.push(format!("macro-edge {e} does not run between its ends"));
         }
         for pair in edge.path.windows(2) {
-            let directions = [[pair[0], pair[1]], [pair[1], pair[0]]];
-            for d in directions {
+            for d in [[pair[0], pair[1]], [pair[1], pair[0]]] {
                 match connectivity.half_edge(d[0], d[1]) {
                     None => problems.push(format!("macro-edge {e} leaves the mesh")),
-                    Some(h) if owner.get(&d) != Some(&layout.quad_of_face[h.face().index()]) => {
-                        problems.push(format!("macro-edge {e} has a face of the wrong quad beside it"));
+                    Some(h) if owner.get(&d) != Some(&cell_of_face[h.face().index()]) => {
+                        problems.push(format!("macro-edge {e} has a face of the wrong cell beside it"));
                     }
                     Some(_) => {}
                 }
             }
         }
     }
-    // Each quad is a disk, and no mesh edge between two quads lies off the macro-edges.
-    let mut vertices = vec![BTreeSet::new(); layout.quads.len()];
-    let mut faces = vec![0i64; layout.quads.len()];
-    let mut inner = vec![0i64; layout.quads.len()];
-    for face in mesh.faces() {
-        let q = layout.quad_of_face[face.index()] as usize;
-        faces[q] += 1;
-        for k in 0..3 {
-            let h = HalfEdgeId::of(face, k);
-            vertices[q].insert(connectivity.origin(h));
-            let other = layout.quad_of_face[connectivity.twin(h).face().index()] as usize;
-            if other == q {
-                inner[q] += 1;
-            } else if !owner.contains_key(&[connectivity.origin(h), connectivity.target(h)]) {
-                problems.push(format!("quads {q} and {other} meet off a macro-edge"));
+    // Macro-edges meet at macro-vertices only.
+    let mut inside: BTreeSet<VertexId> = BTreeSet::new();
+    let corners: BTreeSet<VertexId> = layout.vertices.iter().copied().collect();
+    for (e, edge) in layout.edges.iter().enumerate() {
+        for v in edge.path.iter().skip(1).take(edge.path.len().saturating_sub(2)) {
+            if !inside.insert(*v) || corners.contains(v) {
+                problems.push(format!("macro-edge {e} meets another one at vertex {}", v.0));
             }
         }
     }
-    for q in 0..layout.quads.len() {
-        let euler = vertices[q].len() as i64 - (3 * faces[q] - inner[q] / 2) + faces[q];
-        if euler != 1 {
-            problems.push(format!("quad {q} has Euler characteristic {euler}"));
+    // Each quad is a disk, and no mesh edge between two cells lies off the macro-edges.
+    let mut vertices = vec![BTreeSet::new(); borders.len()];
+    let mut faces = vec![0i64; borders.len()];
+    let mut inner = vec![0i64; borders.len()];
+    for face in mesh.faces() {
+        let cell = cell_of_face[face.index()];
+        faces[cell] += 1;
+        for k in 0..3 {
+            let h = HalfEdgeId::of(face, k);
+            vertices[cell].insert(connectivity.origin(h));
+            let other = connectivity.twin(h);
+            if !other.is_some() {
+                return vec!["the mesh has a border".into()];
+            }
+            let other = cell_of_face[other.face().index()];
+            if other == cell {
+                inner[cell] += 1;
+            } else if !owner.contains_key(&[connectivity.origin(h), connectivity.target(h)]) {
+                problems.push(format!("{} and {} meet off a macro-edge", name(cell), name(other)));
+            }
         }
     }
-    let euler = layout.vertices.len() as i64 - layout.edges.len() as i64 + layout.quads.len() as i64;
-    if euler != connectivity.euler_characteristic(mesh) {
+    let mut all = layout.vertices.len() as i64 - layout.edges.len() as i64;
+    for cell in 0..borders.len() {
+        let euler = vertices[cell].len() as i64 - (3 * faces[cell] - inner[cell] / 2) + faces[cell];
+        if cell < quads && euler != 1 {
+            problems.push(format!("{} has Euler characteristic {euler}", name(cell)));
+        }
+        // Planes and walls of holes are pieces of a sphere: a disk less one for each further border.
+        let expected = 2 - borders[cell].len() as i64;
+        if cell >= quads && euler != expected {
+            problems.push(format!(
+                "{} has Euler characteristic {euler}, with {} borders {expected} is expected",
+                name(cell),
+                borders[cell].len()
+            ));
+        }
+        all += euler;
+    }
+    if all != connectivity.euler_characteristic(mesh) {
         problems.push(format!(
-            "V - E + F is {euler}, that of the mesh {}",
+            "V - E + F is {all}, that of the mesh {}",
             connectivity.euler_characteristic(mesh)
         ));
     }

@@ -25,6 +25,7 @@
 //! ```
 
 mod border;
+mod bordered;
 mod corners;
 mod curves;
 mod densify;
@@ -36,9 +37,10 @@ mod seeding;
 mod tessellate;
 mod tiling;
 mod verify;
+mod verify_bordered;
 
 pub use error::TilingError;
-pub use parameters::Parameters;
-pub use tessellate::tile;
-pub use tiling::{TileId, Tiling};
+pub use parameters::{Method, Parameters};
+pub use tessellate::{tile, tile_sized};
+pub use tiling::{FeatureSegment, TileId, Tiling};
 pub use verify::{Violation, verify};

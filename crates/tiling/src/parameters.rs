@@ -4,10 +4,23 @@ use crate::TilingError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Which tiles are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// The source's tessellation of a closed surface, whose dual is a layout; features run from site to site.
+    #[default]
+    AugmentedVoronoi,
+    /// Tiles of what is left when regions of known shape are taken out; features run along their borders.
+    Bordered,
+}
+
 /// Parameters of the tessellation. All are dimensionless: a part in metres behaves as in millimetres.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Parameters {
+    /// Which tiles are made: "bordered" or "augmented-voronoi".
+    pub method: Method,
     /// Number of tiles to aim at (more are added where the topology asks for them); 0 = from `tile_size`.
     pub tiles: u32,
     /// Distance between neighbouring sites over the mean wall thickness (twice the volume over the area).
@@ -18,11 +31,25 @@ pub struct Parameters {
     pub follow_features: bool,
     /// Least number of faces a tile should have; the mesh is refined where it is coarser.
     pub faces_per_tile: u32,
+    /// Regions of at least the area of a square of this side are faces of their own; over the mean wall thickness.
+    /// Bordered tiles only.
+    pub least_region: f64,
+    /// Tiles whose normals deviate from their mean by more than this are split, degrees. Bordered tiles only.
+    pub normal_cone: f64,
 }
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self { tiles: 0, tile_size: 4.0, lloyd_rounds: 2, follow_features: true, faces_per_tile: 24 }
+        Self {
+            method: Method::default(),
+            tiles: 0,
+            tile_size: 4.0,
+            lloyd_rounds: 2,
+            follow_features: true,
+            faces_per_tile: 24,
+            least_region: 1.0,
+            normal_cone: 70.0,
+        }
     }
 }
 
@@ -38,6 +65,12 @@ impl Parameters {
         }
         if !(4..=10_000).contains(&self.faces_per_tile) {
             return refuse("faces_per_tile", self.faces_per_tile.to_string(), "4 to 10000");
+        }
+        if !(0.0..=1e3).contains(&self.least_region) {
+            return refuse("least_region", self.least_region.to_string(), "0 to 1000");
+        }
+        if !(20.0..=180.0).contains(&self.normal_cone) {
+            return refuse("normal_cone", self.normal_cone.to_string(), "20 to 180 degrees");
         }
         if (1..4).contains(&self.tiles) {
             return refuse("tiles", self.tiles.to_string(), "0, or at least 4");

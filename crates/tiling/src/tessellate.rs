@@ -7,7 +7,7 @@
 use crate::curves::segments;
 use crate::densify::densify;
 use crate::growth::{Growth, NONE};
-use crate::{Parameters, TileId, Tiling, TilingError};
+use crate::{Method, Parameters, TileId, Tiling, TilingError};
 use topipe_mesh::refine::Refiner;
 use topipe_mesh::{DVec3, FaceId, Part, VertexId};
 use topipe_progress::Progress;
@@ -35,8 +35,22 @@ pub(crate) struct Tessellation<'a> {
 
 /// Tiles a closed part; see the crate's documentation.
 pub fn tile(part: &Part, parameters: &Parameters, progress: &Progress) -> Result<Tiling, TilingError> {
+    tile_sized(part, parameters, None, progress)
+}
+
+/// Like [`tile`], with a size field: one factor per face of the part by which tiles shall be smaller (below 1) or larger
+/// there. The source's tessellation knows one size only and ignores it.
+pub fn tile_sized(
+    part: &Part,
+    parameters: &Parameters,
+    sizes: Option<&[f64]>,
+    progress: &Progress,
+) -> Result<Tiling, TilingError> {
     parameters.validate()?;
     check(part)?;
+    if parameters.method == Method::Bordered {
+        return crate::bordered::tile(part, parameters, progress, sizes);
+    }
     let mut refiner = Refiner::new(part)?;
     let area = part.mesh.area();
     let spacing = if parameters.tiles > 0 {
@@ -155,6 +169,14 @@ impl Tessellation<'_> {
         }
         let tile_of_face = self.growth.owner.iter().map(|&owner| number[owner as usize]).collect();
         let (part, _) = self.refiner.finish();
-        Tiling { part, tile_of_face, sites, anchors }
+        Tiling {
+            part,
+            tile_of_face,
+            sites,
+            anchors,
+            bordered: false,
+            regions: Vec::new(),
+            segments: Vec::new(),
+        }
     }
 }

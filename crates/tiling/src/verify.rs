@@ -45,17 +45,28 @@ pub enum Violation {
         /// The face.
         face: u32,
     },
+    /// The border of a tile is not one simple loop, or has fewer than three corners. Bordered tiles only.
+    #[error("the border of tile {tile} {what}")]
+    Border {
+        /// The tile.
+        tile: u32,
+        /// What is wrong with it.
+        what: &'static str,
+    },
     /// A site's face does not lie in its tile, or the arrays do not fit together.
     #[error("the tiling's arrays do not fit together: {0}")]
     Inconsistent(String),
 }
 
-/// Checks conditions (a) to (d) of the source's Definition 1; an empty list means that they all hold.
+/// Checks what a [`Tiling`] guarantees; an empty list means that all of it holds.
 ///
-/// Tile corners are also counted: on a closed surface each corner belongs to three tiles, so that the number of
+/// For tiles of the source's tessellation: conditions (a) to (d) of the source's Definition 1; tile corners are also counted: on a closed surface each corner belongs to three tiles, so that the number of
 /// macro-triangles is `2 N - 4 + 4 g`; a different count is reported as inconsistent.
 pub fn verify(tiling: &Tiling) -> Vec<Violation> {
     let mesh = &tiling.part.mesh;
+    if tiling.bordered {
+        return crate::verify_bordered::verify(tiling);
+    }
     let tiles = tiling.tile_count();
     let inconsistent = |what: String| vec![Violation::Inconsistent(what)];
     if tiling.tile_of_face.len() != mesh.face_count() || tiling.anchors.len() != tiles {

@@ -1,0 +1,48 @@
+//! The layout of bordered tiles by midpoint subdivision.
+//!
+//! Each tile of n sides becomes n quads: its centre is joined to the middles of its sides. That needs no matching and no
+//! even count, works with borders, and leaves corners of 360 / n degrees at centres and about 90 at middles.
+
+use crate::outlines::outlines;
+use crate::refine::{Quads, refine};
+use crate::straighten::straighten;
+use crate::{Parameters, QuadLayout, QuadMatchingError, RegionFace, Side};
+use topipe_progress::Progress;
+use topipe_tiling::Tiling;
+
+pub(crate) fn subdivide(
+    tiling: &Tiling,
+    parameters: &Parameters,
+    progress: &Progress,
+) -> Result<QuadLayout, QuadMatchingError> {
+    let (mut regions, faces) = outlines(tiling)?;
+    progress.check()?;
+    for _ in 0..parameters.straightening_rounds {
+        straighten(&mut regions, parameters.snap, progress)?;
+    }
+    let Quads { tiled, vertices, edges, quads, quad_of_face } = refine(regions, parameters.snap, progress)?;
+    let region_faces = faces.into_iter().map(halved).collect();
+    let (part, _) = tiled.refiner.finish();
+    Ok(QuadLayout {
+        part,
+        vertices,
+        edges,
+        quads,
+        quad_of_face,
+        region_faces,
+        tiles: tiling.tile_count() as u32,
+        macro_triangles: 0,
+    })
+}
+
+/// A region face whose sides are the halves of what they were.
+fn halved(face: RegionFace) -> RegionFace {
+    let halves = |side: Side| {
+        [false, true].map(|second| Side {
+            edge: 2 * side.edge + (side.reversed != second) as u32,
+            reversed: side.reversed,
+        })
+    };
+    let loops = face.loops.into_iter().map(|sides| sides.into_iter().flat_map(halves).collect()).collect();
+    RegionFace { region: face.region, loops }
+}

@@ -1,0 +1,155 @@
+//! Tiles of a surface with borders: regions of known shape are taken out, features are barriers.
+//!
+//! The augmented Voronoi tessellation of the source is the dual of a layout: sites become corners, so features have
+//! to run from site to site. Here it is the other way round. A tile is itself a macro-face, whose sides are halved and
+//! joined to its centre by the layout (midpoint subdivision, which asks for no matching), so features run along the
+//! borders of tiles. What is asked of a tile is much less: that it is a disk with a simple border and at least three
+//! corners. Nothing is asked of pairs of tiles, nor of the number of tiles that meet at a vertex.
+//!
+//! 1. Faces of regions become no tile's ([`regions`]). 2. Feature edges are cut into segments ([`barriers`]). 3. Each
+//! side of a segment belongs to one tile, so that corners of the tiles on both sides of it coincide ([`strips`]).
+//! 4. Farthest-point sites fill the rest ([`sites`]). 5. Tiles that violate a condition get more sites ([`repair`]).
+
+mod barriers;
+mod check;
+mod growth;
+mod pieces;
+mod regions;
+mod repair;
+mod sites;
+mod strips;
+mod surface;
+
+use crate::{FeatureSegment, Parameters, TileId, Tiling, TilingError};
+use barriers::Segment;
+use surface::{NONE, Surface};
+use topipe_mesh::refine::Refiner;
+use topipe_mesh::{FaceId, Part, RegionId, VertexId};
+use topipe_progress::Progress;
+
+/// What a tile grows from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Seed {
+    /// Faces along segments, which are fixed.
+    Strip,
+    /// The faces around a vertex.
+    Site(VertexId),
+    /// A piece cut from another tile; it is lost when tiles are grown anew.
+    Piece,
+}
+
+/// Tiles under construction.
+pub(crate) struct Construction<'a> {
+    pub(crate) surface: Surface,
+    pub(crate) segments: Vec<Segment>,
+    /// Per vertex: a segment ends here.
+    pub(crate) is_node: Vec<bool>,
+    /// Strips first, then sites.
+    pub(crate) seeds: Vec<Seed>,
+    /// The strip of each segment side, or `NONE` where a region lies there.
+    pub(crate) strip_of_side: Vec<u32>,
+    pub(crate) parameters: &'a Parameters,
+    pub(crate) progress: &'a Progress,
+}
+
+/// Tiles a closed part that has been checked.
+pub(crate) fn tile(
+    part: &Part,
+    parameters: &Parameters,
+    progress: &Progress,
+    sizes: Option<&[f64]>,
+) -> Result<Tiling, TilingError> {
+    let refiner = Refiner::new(part)?;
+    let wall = 2.0 * part.mesh.volume().abs() / part.mesh.area();
+    let least_area =
+        if parameters.follow_features { (parameters.least_region * wall).powi(2) } else { f64::INFINITY };
+    let (region_of_face, handed_back) = regions::choose(&refiner, least_area);
+    if handed_back > 0 {
+        progress.remark(&format!(
+            "{handed_back} faces of regions too small or pinched are tiled like free surface"
+        ));
+    }
+    let free_area: f64 = part
+        .mesh
+        .faces()
+        .filter(|f| region_of_face[f.index()] == RegionId::NONE)
+        .map(|f| part.mesh.area_vector(f).length() / 2.0)
+        .sum();
+    let spacing = if parameters.tiles > 0 {
+        // Hexagonal tiles of equal area.
+        (2.0 * free_area.max(1e-3 * part.mesh.area()) / (3f64.sqrt() * f64::from(parameters.tiles))).sqrt()
+    } else {
+        parameters.tile_size * wall
+    };
+    let factor = |f: usize| sizes.and_then(|s| s.get(f)).copied().filter(|s| *s > 0.0).unwrap_or(1.0);
+    let size: Vec<f64> = (0..part.mesh.face_count()).map(|f| spacing * factor(f)).collect();
+    let mut surface = Surface::new(refiner, region_of_face, size);
+    surface.densify(parameters.faces_per_tile, progress)?;
+    let segments = if parameters.follow_features { barriers::segments(&mut surface) } else { Vec::new() };
+    let mut construction = Construction {
+        is_node: Vec::new(),
+        surface,
+        segments,
+        seeds: Vec::new(),
+        strip_of_side: Vec::new(),
+        parameters,
+        progress,
+    };
+    construction.lay_strips();
+    construction.fill()?;
+    for _ in 0..parameters.lloyd_rounds {
+        progress.check()?;
+        construction.relax();
+    }
+    construction.repair()?;
+    Ok(construction.finish())
+}
+
+impl Construction<'_> {
+    pub(crate) fn faces_by_tile(&self) -> Vec<Vec<FaceId>> {
+        let mut faces = vec![Vec::new(); self.seeds.len()];
+        for (f, &owner) in self.surface.owner.iter().enumerate() {
+            if owner != NONE {
+                faces[owner as usize].push(FaceId::new(f));
+            }
+        }
+        faces
+    }
+
+    fn finish(self) -> Tiling {
+        let by_tile = self.faces_by_tile();
+        let mut number = vec![TileId::NONE; self.seeds.len()];
+        let mut sites = Vec::new();
+        for (tile, faces) in by_tile.iter().enumerate() {
+            let nearest = faces.iter().copied().min_by(|a, b| {
+                let d = |f: &FaceId| self.surface.distance[f.index()];
+                d(a).total_cmp(&d(b)).then(a.cmp(b))
+            });
+            if let Some(face) = nearest {
+                number[tile] = TileId(sites.len() as u32);
+                sites.push(face);
+            }
+        }
+        let tile_of_face = self
+            .surface
+            .owner
+            .iter()
+            .map(|&owner| if owner == NONE { TileId::NONE } else { number[owner as usize] })
+            .collect();
+        let segments =
+            self.segments.into_iter().map(|s| FeatureSegment { path: s.path, kind: s.kind }).collect();
+        let region_of_face = self.surface.region;
+        let mut regions: Vec<RegionId> = region_of_face.iter().copied().filter(|r| r.is_some()).collect();
+        regions.sort_unstable();
+        regions.dedup();
+        let (mut part, _) = self.surface.refiner.finish();
+        // A face that was handed back is no longer part of a region that is a face of its own.
+        for (own, chosen) in part.region_of_face.iter_mut().zip(&region_of_face) {
+            if own != chosen && regions.binary_search(own).is_ok() {
+                *own = RegionId::NONE;
+            }
+        }
+        let anchors = vec![None; sites.len()];
+        Tiling { part, tile_of_face, sites, anchors, bordered: true, regions, segments }
+    }
+}

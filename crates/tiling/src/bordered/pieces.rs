@@ -1,0 +1,201 @@
+//! Tiles that are no disks are cut to pieces.
+//!
+//! A tile is cut in two by growing two seeds inside it; the other tiles stay as they are but for new corners on their
+//! borders. A ring falls into two halves at the first cut. A tile with fewer faces each time ends as a disk, at the
+//! latest as a single face. A lens, a disk with two corners only, is joined to the neighbour along its longer side, or
+//! that neighbour is cut in two so that the lens gets a corner.
+
+use super::check::{Fault, Outline, Stamps, outline};
+use super::growth::Candidate;
+use super::surface::NONE;
+use super::{Construction, Seed};
+use crate::TilingError;
+use std::collections::{BTreeMap, BinaryHeap};
+use topipe_mesh::{FaceId, HalfEdgeId};
+
+/// Rounds after which it gives up. Cutting needs a few; lenses may ask for some more.
+const MOST_ROUNDS: usize = 60;
+/// Rounds in which lenses are joined to a neighbour; later neighbours are cut.
+const JOIN_ROUNDS: usize = 20;
+
+impl Construction<'_> {
+    /// Cuts until all tiles are disks with simple borders and three corners. Returns the tiles that can not be helped
+    /// because they are held by their own segments.
+    pub(crate) fn cut_to_disks(&mut self) -> Result<Vec<u32>, TilingError> {
+        let mut held = Vec::new();
+        for round in 0..MOST_ROUNDS {
+            self.progress.check()?;
+            held.clear();
+            let mut by_tile = self.faces_by_tile();
+            let is_corner = self.corner_vertices();
+            let mut stamps = Stamps::new(is_corner.len());
+            let mut busy = vec![false; self.seeds.len()];
+            let mut changes = 0;
+            for tile in 0..by_tile.len() as u32 {
+                let faces = std::mem::take(&mut by_tile[tile as usize]);
+                if faces.is_empty() || busy[tile as usize] {
+                    continue;
+                }
+                let surface = &self.surface;
+                // Faces that were split since still belong to it; they are looked at in the next round.
+                let found = outline(surface, &faces, |h| surface.is_border(h), &is_corner, &mut stamps);
+                match found {
+                    Err(Fault::NotDisk | Fault::Pinch(_)) => {
+                        if self.bisect(tile, &faces) {
+                            changes += 1;
+                            self.mark_neighbors(&faces, &mut busy);
+                        } else {
+                            held.push(tile);
+                        }
+                    }
+                    Ok(Outline { border, corners }) if corners.len() < 3 => {
+                        match self.relieve_lens(tile, &border, &corners, &busy, round < JOIN_ROUNDS) {
+                            Lens::Changed => {
+                                changes += 1;
+                                self.mark_neighbors(&faces, &mut busy);
+                            }
+                            Lens::Later => changes += 1,
+                            Lens::Held => held.push(tile),
+                        }
+                    }
+                    Ok(_) => {}
+                }
+            }
+            if changes == 0 {
+                return Ok(held);
+            }
+            self.progress.remark(&format!("cutting, round {round}: {changes} tiles changed"));
+        }
+        Ok(held)
+    }
+
+    fn mark_neighbors(&self, faces: &[FaceId], busy: &mut [bool]) {
+        for &f in faces {
+            for k in 0..3 {
+                let other = self.surface.refiner.twin(HalfEdgeId::of(f, k)).face();
+                for owner in [self.surface.owner[f.index()], self.surface.owner[other.index()]] {
+                    if let Some(slot) = busy.get_mut(owner as usize) {
+                        *slot = true;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Distances inside a tile from some of its faces, and which of them is nearest. Faces that are not reached are
+    /// left out.
+    fn within(&self, tile: u32, seeds: &[(u32, FaceId)]) -> BTreeMap<FaceId, (f64, u32)> {
+        let surface = &self.surface;
+        let mut found: BTreeMap<FaceId, (f64, u32)> = BTreeMap::new();
+        let mut heap: BinaryHeap<Candidate> =
+            seeds.iter().map(|&(piece, face)| Candidate { distance: 0.0, tile: piece, face }).collect();
+        while let Some(Candidate { distance, tile: piece, face }) = heap.pop() {
+            if found.contains_key(&face) {
+                continue;
+            }
+            found.insert(face, (distance, piece));
+            for k in 0..3 {
+                let h = HalfEdgeId::of(face, k);
+                let next = surface.refiner.twin(h).face();
+                if !surface.is_barrier(h) && surface.owner[next.index()] == tile && !found.contains_key(&next)
+                {
+                    heap.push(Candidate { distance: distance + surface.step(h), tile: piece, face: next });
+                }
+            }
+        }
+        found
+    }
+
+    /// Cuts a tile in two; false where all of it is fixed along segments.
+    fn bisect(&mut self, tile: u32, faces: &[FaceId]) -> bool {
+        let fixed: Vec<FaceId> = faces.iter().copied().filter(|f| self.surface.fixed[f.index()]).collect();
+        let farthest = |found: &BTreeMap<FaceId, (f64, u32)>| {
+            // Not reached at all is farthest.
+            let distance = |f: &FaceId| found.get(f).map_or(f64::INFINITY, |e| e.0);
+            faces
+                .iter()
+                .copied()
+                .filter(|f| !self.surface.fixed[f.index()])
+                .max_by(|a, b| distance(a).total_cmp(&distance(b)).then(b.cmp(a)))
+        };
+        let first: Vec<FaceId> = if fixed.is_empty() {
+            let Some(end) = farthest(&self.within(tile, &[(0, faces[0])])) else { return false };
+            vec![end]
+        } else {
+            fixed
+        };
+        let seeds: Vec<(u32, FaceId)> = first.iter().map(|&f| (0, f)).collect();
+        let Some(second) = farthest(&self.within(tile, &seeds)) else { return false };
+        if first.contains(&second) {
+            return false;
+        }
+        let mut seeds = seeds;
+        seeds.push((1, second));
+        self.take(tile, &seeds);
+        true
+    }
+
+    /// Gives the faces of a tile that are nearer to the seeds of piece 1 to a new tile.
+    fn take(&mut self, tile: u32, seeds: &[(u32, FaceId)]) {
+        let number = self.seeds.len() as u32;
+        self.seeds.push(Seed::Piece);
+        for (face, (distance, piece)) in self.within(tile, seeds) {
+            if piece == 1 {
+                self.surface.owner[face.index()] = number;
+                self.surface.distance[face.index()] = distance;
+            }
+        }
+    }
+
+    fn relieve_lens(
+        &mut self,
+        tile: u32,
+        border: &[HalfEdgeId],
+        corners: &[usize],
+        busy: &[bool],
+        join: bool,
+    ) -> Lens {
+        // An island in another tile: that one is no disk and is cut.
+        let [0, second] = corners[..] else { return Lens::Later };
+        let surface = &self.surface;
+        let sides = [&border[..second], &border[second..]];
+        let across = |side: &[HalfEdgeId]| surface.owner[surface.refiner.twin(side[0]).face().index()];
+        let length = |side: &[HalfEdgeId]| side.iter().map(|&h| surface.length(h)).sum::<f64>();
+        let mut open: Vec<usize> = (0..2).filter(|&i| !surface.is_barrier(sides[i][0])).collect();
+        open.sort_by(|&i, &j| length(sides[j]).total_cmp(&length(sides[i])).then(i.cmp(&j)));
+        let neighbors = [across(sides[0]), across(sides[1])];
+        let Some(&longest) = open.first() else { return Lens::Held };
+        let free = |owner: u32| owner != NONE && busy.get(owner as usize) == Some(&false);
+        if neighbors.iter().any(|&n| n != NONE && !free(n)) {
+            return Lens::Later;
+        }
+        let neighbor = neighbors[longest];
+        if join && neighbors[0] != neighbors[1] {
+            for owner in self.surface.owner.iter_mut().filter(|o| **o == tile) {
+                *owner = neighbor;
+            }
+            return Lens::Changed;
+        }
+        let side = sides[longest];
+        if side.len() == 1 {
+            self.surface.split_edge(side[0], 0.5);
+            return Lens::Changed;
+        }
+        let ends = [side[0], side[side.len() - 1]].map(|h| self.surface.refiner.twin(h).face());
+        if ends[0] == ends[1] {
+            self.surface.split_face(ends[0]);
+            return Lens::Changed;
+        }
+        self.take(neighbor, &[(0, ends[0]), (1, ends[1])]);
+        Lens::Changed
+    }
+}
+
+enum Lens {
+    /// Something was done.
+    Changed,
+    /// A neighbour was changed in this round; look again in the next.
+    Later,
+    /// Both of its sides are segments.
+    Held,
+}

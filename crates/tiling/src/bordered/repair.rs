@@ -1,0 +1,234 @@
+//! Repair: all violations of a round are collected, and an independent set of them is repaired together.
+//!
+//! A tile has to be a disk with a simple border and three corners or more. It should not bend too much, or a patch can
+//! not follow it, and should not have too many sides. In some rounds tiles that violate this get another site, which
+//! gives well-shaped tiles but is not sure to end. Then tiles that still are no disks are cut to pieces, which changes
+//! no other tile but for new corners, so that it ends; see [`super::pieces`].
+
+use super::check::{Fault, Outline, Stamps, normal_cone, outline};
+use super::{Construction, Seed};
+use crate::TilingError;
+use std::collections::BTreeSet;
+use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
+
+/// Rounds in which sites are added.
+const SITE_ROUNDS: usize = 12;
+/// How often segments are halved and everything is begun again.
+const ATTEMPTS: usize = 8;
+/// Most sides of a tile: the corners at its centre are 360 degrees over that.
+const MOST_SIDES: usize = 8;
+
+/// A site that is asked for may lie this many rings of vertices from the place; the tile is refined else.
+const RINGS: usize = 2;
+
+pub(crate) enum Remedy {
+    /// A site near this vertex.
+    Site(VertexId),
+    /// A node in the middle of the longest segment along the tile.
+    Halve,
+}
+
+impl Construction<'_> {
+    pub(crate) fn remedy(
+        &self,
+        tile: u32,
+        faces: &[FaceId],
+        is_corner: &[bool],
+        stamps: &mut Stamps,
+        quality: bool,
+    ) -> Option<Remedy> {
+        let surface = &self.surface;
+        let Outline { border, corners } =
+            match outline(surface, faces, |h| surface.is_border(h), is_corner, stamps) {
+                Ok(outline) => outline,
+                Err(Fault::Pinch(v)) if !surface.on_barrier[v.index()] => return Some(Remedy::Site(v)),
+                Err(_) => return Some(self.unfold(tile, faces, is_corner, stamps)),
+            };
+        let far = |face: FaceId| surface.refiner.part().mesh.triangles[face.index()][0];
+        if corners.len() < 3 {
+            // The longest stretch along a neighbour is cut in two by a tile in its middle.
+            let mut best: Option<(f64, usize)> = None;
+            let starts = if corners.is_empty() { vec![0] } else { corners.clone() };
+            for (i, &start) in starts.iter().enumerate() {
+                let end = if i + 1 < starts.len() { starts[i + 1] } else { border.len() };
+                if border[start..end].iter().any(|&h| surface.is_barrier(h)) {
+                    continue;
+                }
+                let length: f64 = border[start..end].iter().map(|&h| surface.length(h)).sum();
+                if best.is_none_or(|(longest, _)| length > longest) {
+                    best = Some((length, (start + end) / 2));
+                }
+            }
+            return Some(match best {
+                Some((_, middle)) => Remedy::Site(surface.refiner.origin(border[middle])),
+                None => Remedy::Halve,
+            });
+        }
+        if !quality {
+            return None;
+        }
+        let (angle, face) = normal_cone(surface, faces);
+        if angle > self.parameters.normal_cone.to_radians() {
+            return Some(Remedy::Site(far(face)));
+        }
+        if corners.len() > MOST_SIDES {
+            return farthest(self, faces).map(|face| Remedy::Site(far(face)));
+        }
+        None
+    }
+
+    /// The remedy for a tile that is no disk with a simple border.
+    fn unfold(&self, tile: u32, faces: &[FaceId], is_corner: &[bool], stamps: &mut Stamps) -> Remedy {
+        let surface = &self.surface;
+        let own: Vec<FaceId> = faces.iter().copied().filter(|f| surface.fixed[f.index()]).collect();
+        let in_own = |f: FaceId| surface.fixed[f.index()] && surface.owner[f.index()] == tile;
+        let border = |h: HalfEdgeId| surface.is_barrier(h) || !in_own(surface.refiner.twin(h).face());
+        if !own.is_empty() && outline(surface, &own, border, is_corner, stamps).is_err() {
+            return Remedy::Halve;
+        }
+        match farthest(self, faces) {
+            Some(face) => Remedy::Site(surface.refiner.part().mesh.triangles[face.index()][0]),
+            None => Remedy::Halve,
+        }
+    }
+
+    /// Violating tiles with their remedies, no two of them neighbours.
+    fn violations(&self, quality: bool) -> Vec<(u32, Remedy)> {
+        let by_tile = self.faces_by_tile();
+        let is_corner = self.corner_vertices();
+        let mut stamps = Stamps::new(is_corner.len());
+        let mut busy = vec![false; self.seeds.len()];
+        let mut found = Vec::new();
+        for tile in 0..self.seeds.len() as u32 {
+            let faces = &by_tile[tile as usize];
+            if busy[tile as usize] || faces.is_empty() {
+                continue;
+            }
+            if let Some(remedy) = self.remedy(tile, faces, &is_corner, &mut stamps, quality) {
+                busy[tile as usize] = true;
+                for &f in faces {
+                    for k in 0..3 {
+                        let other = self.surface.refiner.twin(HalfEdgeId::of(f, k)).face();
+                        if let Some(slot) = busy.get_mut(self.surface.owner[other.index()] as usize) {
+                            *slot = true;
+                        }
+                    }
+                }
+                found.push((tile, remedy));
+            }
+        }
+        found
+    }
+
+    /// First strips, then sites, then pieces; see the head of this file.
+    pub(crate) fn repair(&mut self) -> Result<(), TilingError> {
+        let mut left = Vec::new();
+        for attempt in 0..ATTEMPTS {
+            self.add_sites_where_asked(if attempt == 0 { SITE_ROUNDS } else { 2 })?;
+            left = self.cut_to_disks()?;
+            if left.is_empty() {
+                return Ok(());
+            }
+            self.progress
+                .remark(&format!("{} tiles are held by their segments, which are halved", left.len()));
+            self.seeds.retain(|seed| *seed != Seed::Piece);
+            for &tile in &left {
+                self.halve_segment_of(tile);
+            }
+            self.lay_strips();
+        }
+        let by_tile = self.faces_by_tile();
+        let face = left.first().and_then(|&tile| by_tile[tile as usize].first());
+        let p = face.map_or(DVec3::ZERO, |f| self.surface.centroid[f.index()]);
+        Err(TilingError::NotConverged { violations: left.len(), rounds: ATTEMPTS, x: p.x, y: p.y, z: p.z })
+    }
+
+    /// Rounds in which violating tiles get sites near what is wrong with them, and tiles are grown anew.
+    fn add_sites_where_asked(&mut self, rounds: usize) -> Result<(), TilingError> {
+        for round in 0..rounds {
+            self.progress.check()?;
+            let violations = self.violations(true);
+            if violations.is_empty() {
+                return Ok(());
+            }
+            self.progress.remark(&format!("round {round}: {} tiles to split", violations.len()));
+            let mut halved = false;
+            let mut occupied = self.occupied();
+            for (tile, remedy) in violations {
+                match remedy {
+                    Remedy::Site(place) => {
+                        if let Some(v) = self.free_vertex_near(place, tile, &occupied) {
+                            self.add_site(v, &mut occupied);
+                        }
+                    }
+                    Remedy::Halve => halved |= self.halve_segment_of(tile),
+                }
+            }
+            if halved {
+                self.lay_strips();
+            }
+        }
+        Ok(())
+    }
+
+    /// The vertex nearest to `place`, by breadth-first search inside a tile, where a site may be placed.
+    fn free_vertex_near(&self, place: VertexId, tile: u32, occupied: &[bool]) -> Option<VertexId> {
+        let surface = &self.surface;
+        let mut seen = BTreeSet::from([place]);
+        let mut ring = vec![place];
+        for _ in 0..=RINGS {
+            let free = ring.iter().copied().filter(|&v| self.may_be_site(v, occupied)).min();
+            if free.is_some() {
+                return free;
+            }
+            let mut next = Vec::new();
+            for v in ring {
+                for h in surface.refiner.outgoing(v) {
+                    let inside = surface.owner[h.face().index()] == tile;
+                    for w in [surface.refiner.target(h), surface.refiner.origin(h.prev())] {
+                        if inside && seen.insert(w) {
+                            next.push(w);
+                        }
+                    }
+                }
+            }
+            ring = next;
+        }
+        None
+    }
+
+    /// Halves the longest segment along a strip; false if there is none.
+    fn halve_segment_of(&mut self, tile: u32) -> bool {
+        let mut longest: Option<(f64, usize)> = None;
+        for (side, &strip) in self.strip_of_side.iter().enumerate() {
+            let Some(segment) = self.segments.get(side / 2) else { continue };
+            if strip == tile {
+                let length: f64 = segment
+                    .path
+                    .windows(2)
+                    .map(|w| self.surface.position(w[0]).distance(self.surface.position(w[1])))
+                    .sum();
+                if longest.is_none_or(|(most, _)| length > most) {
+                    longest = Some((length, side / 2));
+                }
+            }
+        }
+        let Some((_, segment)) = longest else { return false };
+        match self.segments[segment].halve(&mut self.surface) {
+            Some(second) => {
+                self.segments.push(second);
+                true
+            }
+            None => false,
+        }
+    }
+}
+
+/// The free face of a tile that is farthest from where it grew from.
+fn farthest(construction: &Construction<'_>, faces: &[FaceId]) -> Option<FaceId> {
+    let surface = &construction.surface;
+    faces.iter().copied().filter(|f| !surface.fixed[f.index()]).max_by(|a, b| {
+        let d = |f: &FaceId| surface.distance[f.index()];
+        d(a).total_cmp(&d(b)).then(b.cmp(a))
+    })
+}
