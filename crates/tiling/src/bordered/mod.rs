@@ -6,9 +6,11 @@
 //! borders of tiles. What is asked of a tile is much less: that it is a disk with a simple border and at least three
 //! corners. Nothing is asked of pairs of tiles, nor of the number of tiles that meet at a vertex.
 //!
-//! 1. Faces of regions become no tile's ([`regions`]). 2. Feature edges are cut into segments ([`barriers`]). 3. Each
-//! side of a segment belongs to one tile, so that corners of the tiles on both sides of it coincide ([`strips`]).
-//! 4. Farthest-point sites fill the rest ([`sites`]). 5. Tiles that violate a condition get more sites ([`repair`]).
+//! - Faces of regions become no tile's ([`regions`]).
+//! - Feature edges are cut into segments ([`barriers`]).
+//! - Each side of a segment belongs to one tile, so that corners of the tiles on both sides coincide ([`strips`]).
+//! - Farthest-point sites fill the rest ([`sites`]).
+//! - Tiles that violate a condition get more sites ([`repair`]), and at last are cut to pieces ([`pieces`]).
 
 mod barriers;
 mod check;
