@@ -48,10 +48,11 @@ pub(crate) fn merge(layout: &mut QuadLayout) {
     layout.quad_of_face.iter_mut().for_each(|quad| *quad = number[*quad as usize]);
 }
 
-/// Drops macro-edges and macro-vertices that no quad uses.
+/// Drops macro-edges and macro-vertices that no side of a quad or of a region face uses.
 pub(crate) fn compact(layout: &mut QuadLayout) {
     let mut edge_used = vec![false; layout.edges.len()];
-    layout.quads.iter().flatten().for_each(|side| edge_used[side.edge as usize] = true);
+    let loops = layout.region_faces.iter().flat_map(|face| face.loops.iter().flatten());
+    layout.quads.iter().flatten().chain(loops).for_each(|side| edge_used[side.edge as usize] = true);
     let mut vertex_used = vec![false; layout.vertices.len()];
     for (edge, _) in layout.edges.iter().zip(&edge_used).filter(|(_, used)| **used) {
         edge.ends.iter().for_each(|&v| vertex_used[v as usize] = true);
@@ -73,7 +74,8 @@ pub(crate) fn compact(layout: &mut QuadLayout) {
     for edge in &mut layout.edges {
         edge.ends = edge.ends.map(|v| vertex_number[v as usize]);
     }
-    for side in layout.quads.iter_mut().flatten() {
+    let loops = layout.region_faces.iter_mut().flat_map(|face| face.loops.iter_mut().flatten());
+    for side in layout.quads.iter_mut().flatten().chain(loops) {
         side.edge = edge_number[side.edge as usize];
     }
 }

@@ -77,6 +77,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     topipe_spline_fit::step::write(
         &surface,
         "part",
+        topipe_spline_fit::step::Protocol::Ap214,
         &mut std::io::BufWriter::new(std::fs::File::create(folder.join("part.step"))?),
     )?;
     topipe_mesh::write::stl(&smoothed.mesh, &mut std::fs::File::create(folder.join("smooth.stl"))?)?;

@@ -45,6 +45,8 @@ pub fn fit(
         surface = solve(layout, &basis, &samples, parameters, progress)?;
         progress.step(round + 1, rounds, "rounds");
     }
+    crate::adapt::adapt(&mut surface, crate::borders::borders(layout)?)
+        .ok_or_else(|| SplineFitError::Layout("knots of edges do not fit".into()))?;
     Ok(surface)
 }
 
@@ -148,7 +150,7 @@ fn solve(
         .map(|v| {
             let vertex = layout.vertices[v];
             let position = mesh.position(vertex);
-            if layout.part.frozen[vertex.index()] || on_feature[v] {
+            if layout.part.frozen[vertex.index()] || on_feature[v] || around[v].is_empty() {
                 return Ok(position);
             }
             solve_group(&around[v], &unknowns, &energies, &known)
@@ -181,6 +183,11 @@ fn solve(
                 let lambda = 1.0 - (1.0 - parameters.lambda) * 1e-4;
                 return fit_curve(basis, &gram, &points, ends, lambda)
                     .ok_or_else(|| singular("edge", e, points[0]));
+            }
+            if beside[e].is_empty() {
+                // Between two region faces.
+                let ends = edge.ends.map(|v| known[v as usize].unwrap_or_default());
+                return Ok((1..n - 1).map(|m| ends[0].lerp(ends[1], m as f64 / (n - 1) as f64)).collect());
             }
             let found = solve_group(&beside[e], &unknowns, &energies, &known);
             (1..n - 1)

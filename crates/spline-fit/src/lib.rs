@@ -10,25 +10,28 @@
 //! Not guaranteed: tangent continuity across edges (C0 as in the source), a bound on the deviation, or that patches
 //! of quads with corners near 180 degrees are regular.
 
+mod adapt;
+mod analytic_face;
 pub mod basis;
-#[allow(dead_code)] // The fit is about to use it.
 mod borders;
 mod cholesky;
+mod edge_curve;
 mod energy;
 mod error;
 mod fit;
 mod foot_points;
-#[allow(dead_code)] // Used by the borders.
 mod hermite;
 mod parameters;
 mod samples;
 mod shells;
+mod simplify;
 pub mod step;
 mod surface;
 mod tessellate;
 mod unknowns;
 
 pub use basis::Basis;
+pub use edge_curve::CurvePoint;
 pub use error::SplineFitError;
 pub use fit::fit;
 pub use parameters::Parameters;

@@ -4,11 +4,13 @@ use crate::energy::gauss;
 use crate::{Patch, SplineSurface};
 use topipe_mesh::DVec3;
 
-/// A connected set of patches.
+/// A connected set of patches and analytic faces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shell {
     /// Indices of its patches, in order.
     pub patches: Vec<usize>,
+    /// Indices of its analytic faces, in order.
+    pub faces: Vec<usize>,
     /// Signed volume, mm^3: negative for a cavity.
     pub volume: f64,
     /// For a cavity, the index of the smallest shell around it (by bounding box of the control points).
@@ -38,43 +40,58 @@ fn volume(patch: &Patch, center: DVec3) -> f64 {
     sum / 3.0
 }
 
-/// The shells of `surface`, numbered by their lowest patches.
+/// The shells of `surface`, numbered by their lowest patches, those without patches by their lowest faces.
 pub fn shells(surface: &SplineSurface) -> Vec<Shell> {
+    // Patches first, then analytic faces, under one numbering.
+    let count = surface.patches.len();
+    let edges_of = |piece: usize| -> Vec<u32> {
+        match piece.checked_sub(count) {
+            None => surface.patches[piece].sides.iter().map(|side| side.edge).collect(),
+            Some(face) => surface.faces[face].loops.iter().flatten().map(|side| side.edge).collect(),
+        }
+    };
+    let pieces = count + surface.faces.len();
     let mut beside: Vec<Vec<usize>> = vec![Vec::new(); surface.edges.len()];
-    for (p, patch) in surface.patches.iter().enumerate() {
-        patch.sides.iter().for_each(|side| beside[side.edge as usize].push(p));
+    for piece in 0..pieces {
+        edges_of(piece).into_iter().for_each(|edge| beside[edge as usize].push(piece));
     }
-    let mut shell_of = vec![usize::MAX; surface.patches.len()];
+    let mut seen = vec![false; pieces];
     let mut shells: Vec<Shell> = Vec::new();
     let mut boxes: Vec<(DVec3, DVec3)> = Vec::new();
-    for seed in 0..surface.patches.len() {
-        if shell_of[seed] != usize::MAX {
+    for seed in 0..pieces {
+        if seen[seed] {
             continue;
         }
-        let number = shells.len();
-        shell_of[seed] = number;
-        let mut patches = vec![seed];
+        seen[seed] = true;
+        let mut members = vec![seed];
         let mut next = 0;
-        while next < patches.len() {
-            let patch = &surface.patches[patches[next]];
-            next += 1;
-            for side in &patch.sides {
-                for &other in &beside[side.edge as usize] {
-                    if shell_of[other] == usize::MAX {
-                        shell_of[other] = number;
-                        patches.push(other);
+        while next < members.len() {
+            for edge in edges_of(members[next]) {
+                for &other in &beside[edge as usize] {
+                    if !seen[other] {
+                        seen[other] = true;
+                        members.push(other);
                     }
                 }
             }
+            next += 1;
         }
-        patches.sort_unstable();
-        let control = || patches.iter().flat_map(|&p| surface.patches[p].control.iter().copied());
-        let low = control().fold(DVec3::INFINITY, DVec3::min);
-        let high = control().fold(DVec3::NEG_INFINITY, DVec3::max);
+        members.sort_unstable();
+        let split = members.partition_point(|&piece| piece < count);
+        let faces: Vec<usize> = members[split..].iter().map(|&piece| piece - count).collect();
+        let patches = members[..split].to_vec();
+        // A face of known shape lies between its borders, or bulges by less than they do.
+        let of_patches = patches.iter().flat_map(|&p| surface.patches[p].control.iter().copied());
+        let sides = faces.iter().flat_map(|&f| surface.faces[f].loops.iter().flatten());
+        let of_faces = sides.flat_map(|side| surface.edges[side.edge as usize].control.iter().copied());
+        let (low, high) = of_patches
+            .chain(of_faces)
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
         let center = (low + high) / 2.0;
-        let volume = patches.iter().map(|&p| volume(&surface.patches[p], center)).sum();
+        let under_patches: f64 = patches.iter().map(|&p| volume(&surface.patches[p], center)).sum();
+        let under_faces: f64 = faces.iter().map(|&f| surface.faces[f].volume(&surface.edges, center)).sum();
         boxes.push((low, high));
-        shells.push(Shell { patches, volume, inside: None });
+        shells.push(Shell { patches, faces, volume: under_patches + under_faces, inside: None });
     }
     for cavity in 0..shells.len() {
         if shells[cavity].volume >= 0.0 {
@@ -90,7 +107,7 @@ pub fn shells(surface: &SplineSurface) -> Vec<Shell> {
 }
 
 impl SplineSurface {
-    /// The signed volume inside the surface, mm^3; exact for the splines up to rounding.
+    /// The signed volume inside the surface, mm^3: to rounding for patches, planes and cylinders.
     pub fn volume(&self) -> f64 {
         shells(self).iter().map(|shell| shell.volume).sum()
     }

@@ -21,7 +21,8 @@ pub enum CurveShape {
     Spline,
     /// The straight line between its ends.
     Line,
-    /// An arc of a circle from the first end to the last, counter-clockwise about the axis and shorter than a turn.
+    /// An arc of a circle from the first end to the last, counter-clockwise about the axis; a whole circle where both
+    /// are the same vertex.
     Arc {
         /// Centre of the circle, mm.
         center: DVec3,
@@ -101,14 +102,6 @@ impl SurfacePoint {
     /// The unit normal, or zero where the patch is singular.
     pub fn normal(&self) -> DVec3 {
         self.du.cross(self.dv).normalize_or_zero()
-    }
-}
-
-impl EdgeCurve {
-    /// The point at `t`.
-    pub fn position(&self, t: f64) -> DVec3 {
-        let local = self.basis.evaluate(t);
-        (0..local.count).map(|k| local.derivatives[0][k] * self.control[local.first + k]).sum()
     }
 }
 

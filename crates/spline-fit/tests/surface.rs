@@ -182,7 +182,7 @@ fn a_finer_tessellation_is_nearer() {
 fn the_step_file_lists_every_entity_once() {
     let surface = fitted(&layout(&sphere(4), 1.5));
     let mut bytes = Vec::new();
-    step::write(&surface, "a 'ball'", &mut bytes).unwrap();
+    step::write(&surface, "a 'ball'", step::Protocol::Ap214, &mut bytes).unwrap();
     let text = String::from_utf8(bytes.clone()).unwrap();
     let count = |entity: &str| text.matches(entity).count();
     assert_eq!(count("=ADVANCED_FACE("), surface.patches.len());
@@ -201,7 +201,7 @@ fn the_step_file_lists_every_entity_once() {
     let along: usize = surface.edges.iter().map(|e| e.control.len() - 2).sum();
     assert_eq!(count("=CARTESIAN_POINT("), inner + along + surface.vertices.len() + 1);
     let mut again = Vec::new();
-    step::write(&surface, "a 'ball'", &mut again).unwrap();
+    step::write(&surface, "a 'ball'", step::Protocol::Ap214, &mut again).unwrap();
     assert_eq!(bytes, again);
 }
 
@@ -220,7 +220,7 @@ fn a_cavity_becomes_a_void() {
     let outer = shells.iter().position(|s| s.volume > 0.0).unwrap();
     assert_eq!(shells[1 - outer].inside, Some(outer));
     let mut bytes = Vec::new();
-    step::write(&surface, "hollow", &mut bytes).unwrap();
+    step::write(&surface, "hollow", step::Protocol::Ap214, &mut bytes).unwrap();
     let text = String::from_utf8(bytes).unwrap();
     assert!(text.contains("=BREP_WITH_VOIDS('hollow',") && !text.contains("=MANIFOLD_SOLID_BREP("));
 }

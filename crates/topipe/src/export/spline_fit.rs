@@ -3,7 +3,7 @@
 use crate::artifacts::SplineSurface;
 use topipe_engine::Exporter;
 use topipe_mesh::{DVec3, TriangleMesh, write};
-use topipe_spline_fit::step;
+use topipe_spline_fit::step::{self, Protocol};
 
 /// Largest distance of a resampled mesh from the surface over the diagonal of its corner points. On the bracket 2e-5
 /// gives 8 million triangles (400 MB of STL), which no viewer likes, 5e-4 a file of the order of the input.
@@ -13,10 +13,10 @@ pub(super) fn exporters() -> Vec<Exporter> {
     let version = env!("TOPIPE_WRITER_SPLINE_FIT");
     vec![
         Exporter::new::<SplineSurface>("step", version, |surface, name, mut file| {
-            Ok(step::write(surface, name, &mut file)?)
+            Ok(step::write(surface, name, Protocol::Ap214, &mut file)?)
         }),
         Exporter::new::<SplineSurface>("stp", version, |surface, name, mut file| {
-            Ok(step::write(surface, name, &mut file)?)
+            Ok(step::write(surface, name, Protocol::Ap214, &mut file)?)
         }),
         Exporter::new::<SplineSurface>("stl", version, |surface, _, mut file| {
             Ok(write::stl(&resample(surface), &mut file)?)

@@ -1,0 +1,95 @@
+//! Seams of walls that go all around their axis.
+//!
+//! A cylinder with a border at either end is not simply connected. Readers cut such a face themselves, where and as
+//! accurately as they like: OpenCASCADE's cuts have a tolerance of 1e-5 mm and split the edges they end on. So the
+//! writer cuts it: along a ruling, from a vertex of one border to the other border, as its own line that the face uses
+//! in both directions. Where the other border has no vertex there, its edge is written in two pieces.
+
+use crate::{AnalyticFace, PatchSide, SplineSurface};
+use std::f64::consts::TAU;
+use topipe_mesh::{DVec3, RegionShape};
+
+/// Where a seam ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum End {
+    /// At a vertex of the surface.
+    Vertex(u32),
+    /// Inside an edge, at this parameter of its exact shape.
+    Inside { edge: u32, t: f64, at: DVec3 },
+}
+
+/// The seam of one face.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Seam {
+    /// For either border: which loop, the side at or in which the seam ends, and where.
+    pub(super) ends: [(usize, usize, End); 2],
+}
+
+/// The seam of `face`, if it needs one. `tolerance` is how far vertices may be from one ruling, mm.
+pub(super) fn seam(surface: &SplineSurface, face: &AnalyticFace, tolerance: f64) -> Option<Seam> {
+    let RegionShape::Cylinder { point, axis, radius, .. } = face.shape else { return None };
+    let alone = |l: usize| AnalyticFace { shape: face.shape, loops: vec![face.loops[l].clone()] };
+    let around: Vec<usize> =
+        (0..face.loops.len()).filter(|&l| alone(l).winding(&surface.edges) != 0).collect();
+    let [a, b] = around[..] else { return None };
+    let out = |p: DVec3| (p - point).reject_from_normalized(axis).normalize_or_zero();
+    // Signed distance along the circumference of `p` from the ruling through `from`.
+    let off = |p: DVec3, from: DVec3| {
+        let (e, f) = (out(from), out(p));
+        axis.cross(e).dot(f).atan2(e.dot(f)) * radius
+    };
+    let start = |side: &PatchSide| surface.edges[side.edge as usize].ends[usize::from(side.reversed)];
+    let position = |v: u32| surface.vertices[v as usize];
+    for (i, side) in face.loops[a].iter().enumerate() {
+        let v = start(side);
+        for (j, other) in face.loops[b].iter().enumerate() {
+            let w = start(other);
+            if off(position(w), position(v)).abs() <= tolerance {
+                return Some(Seam { ends: [(a, i, End::Vertex(v)), (b, j, End::Vertex(w))] });
+            }
+        }
+    }
+    // From a vertex across to the inside of an edge, best one that has no patch beside it.
+    let mut beside_patch = vec![false; surface.edges.len()];
+    for side in surface.patches.iter().flat_map(|patch| patch.sides) {
+        beside_patch[side.edge as usize] = true;
+    }
+    let mut best: Option<(bool, f64, Seam)> = None;
+    for (one, two) in [(a, b), (b, a)] {
+        for (i, side) in face.loops[one].iter().enumerate() {
+            let v = start(side);
+            for (j, other) in face.loops[two].iter().enumerate() {
+                let Some(t) = crossing(surface, other.edge, |p| off(p, position(v)), TAU * radius) else {
+                    continue;
+                };
+                // Not beside a patch, and far from the ends.
+                let (costs, eccentric) = (beside_patch[other.edge as usize], (t - 0.5).abs());
+                if best.as_ref().is_some_and(|&(c, e, _)| (c, e) <= (costs, eccentric)) {
+                    continue;
+                }
+                let at = surface.edges[other.edge as usize].exact(t).position;
+                let end = End::Inside { edge: other.edge, t, at };
+                best = Some((costs, eccentric, Seam { ends: [(one, i, End::Vertex(v)), (two, j, end)] }));
+            }
+        }
+    }
+    best.map(|(.., seam)| seam)
+}
+
+/// The parameter inside an edge at which it crosses the ruling, by bisection. `None` where it does not.
+fn crossing(surface: &SplineSurface, edge: u32, off: impl Fn(DVec3) -> f64, around: f64) -> Option<f64> {
+    const PIECES: u32 = 32;
+    let edge = &surface.edges[edge as usize];
+    let at = |t: f64| off(edge.exact(t).position);
+    let place = |k: u32| f64::from(k) / f64::from(PIECES);
+    let (mut low, mut high) = (0..PIECES).map(|k| (place(k), place(k + 1))).find(|&(s, t)| {
+        // A change of sign on the far side of the axis is a jump by a whole turn.
+        at(s) * at(t) <= 0.0 && (at(s) - at(t)).abs() < around / 2.0
+    })?;
+    let sign = at(high) >= at(low);
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        if (at(middle) >= 0.0) == sign { high = middle } else { low = middle }
+    }
+    Some((low + high) / 2.0)
+}
