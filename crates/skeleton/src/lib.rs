@@ -31,10 +31,12 @@ mod marching_sections;
 mod non_design;
 mod parameters;
 mod skeleton;
+mod torsion;
 
 pub use error::SkeletonError;
 pub use parameters::{Method, Parameters};
-pub use skeleton::{GraphMeasures, PointKind, Section, Skeleton};
+pub use skeleton::{GraphMeasures, PointKind, Section, Skeleton, second_moments, section_frame};
+pub use torsion::torsion_constant;
 
 use topipe_mesh::{Design, Part};
 use topipe_progress::Progress;

@@ -54,6 +54,8 @@ pub enum Section {
         moments: [f64; 2],
         /// The principal axis of the larger moment: the bending axis in which the section is stiffest.
         axis: DVec3,
+        /// Torsion constant of the section as a solid one, mm^4; see [`crate::torsion_constant`].
+        torsion: f64,
     },
 }
 
@@ -185,9 +187,14 @@ impl Skeleton {
                 Section::Box { low, high } => {
                     serde_json::json!({"box_low": vector(low), "box_high": vector(high)})
                 }
-                Section::Plane { area, normal, moments, axis } => serde_json::json!({
-                    "area": area, "normal": vector(normal), "moments": moments, "axis": vector(axis)
-                }),
+                Section::Plane { area, normal, moments, axis, torsion } => {
+                    let (u, v) = section_frame(normal);
+                    let [uu, vv, uv] = second_moments(moments, axis, [u, v]);
+                    serde_json::json!({
+                        "area": area, "normal": vector(normal), "moments": moments, "axis": vector(axis),
+                        "torsion": torsion, "u": vector(u), "v": vector(v), "Iuu": uu, "Ivv": vv, "Iuv": uv
+                    })
+                }
             })
             .collect();
         let measures = self.measures();
@@ -203,4 +210,25 @@ impl Skeleton {
             "remarks": self.remarks,
         })
     }
+}
+
+/// Axes across `normal`, as users of beams expect them: `u` is horizontal (`z` is up; for a vertical normal it is `x`),
+/// and `u`, `v`, `normal` are right-handed.
+pub fn section_frame(normal: DVec3) -> (DVec3, DVec3) {
+    let horizontal = DVec3::Z.cross(normal);
+    let u = if horizontal.length() > 1e-6 {
+        horizontal.normalize()
+    } else {
+        (DVec3::X - normal.x * normal).normalize_or(DVec3::X)
+    };
+    (u, normal.cross(u))
+}
+
+/// `[Iuu, Ivv, Iuv]` about given axes, from the principal moments and the axis of the larger one:
+/// `Iuu = int v^2 dA`, `Ivv = int u^2 dA`, `Iuv = int u v dA`.
+pub fn second_moments(moments: [f64; 2], axis: DVec3, [u, v]: [DVec3; 2]) -> [f64; 3] {
+    let (c, s) = (axis.dot(u), axis.dot(v));
+    let [large, small] = moments;
+    // About an axis the moment is that of distances across it: a tensor with the axes as eigenvectors.
+    [large * c * c + small * s * s, large * s * s + small * c * c, (small - large) * c * s]
 }

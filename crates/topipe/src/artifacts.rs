@@ -27,7 +27,7 @@ kinds! {
     /// A closed surface of B-spline patches.
     SplineSurface = "spline surface" v 2: topipe_spline_fit::SplineSurface;
     /// A curve skeleton.
-    Skeleton = "skeleton" v 1: topipe_skeleton::Skeleton;
+    Skeleton = "skeleton" v 2: topipe_skeleton::Skeleton;
     /// The figures of a validation.
     Report = "report" v 1: topipe_validation::Report;
 }

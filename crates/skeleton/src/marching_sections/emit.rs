@@ -10,6 +10,7 @@ use crate::Parameters;
 use crate::inside::Inside;
 use crate::interface::Sets;
 use crate::skeleton::{PointKind, Section, Skeleton};
+use crate::torsion_constant;
 use glam::DVec3;
 
 /// Rounds of the last centring: each turns the tangents of the neighbours, so one is not enough.
@@ -230,8 +231,13 @@ fn centred(
     points
         .into_iter()
         .map(|l| {
-            let section = Section::Plane { area: l.area, normal: l.normal, moments: l.moments, axis: l.axis };
-            (within(l.centroid, inside), section)
+            // Once more, for the outline: of all the loops cut so far only those of the skeleton need torsion.
+            let torsion = match cutter.cut(l.centroid, l.normal, &branch.vertices, near) {
+                Some(_) => torsion_constant(cutter.outline()),
+                None => 0.0,
+            };
+            let Loop { area, normal, moments, axis, .. } = l;
+            (within(l.centroid, inside), Section::Plane { area, normal, moments, axis, torsion })
         })
         .collect()
 }

@@ -37,6 +37,8 @@ pub(super) struct Cutter<'a> {
     claimed: Vec<u32>,
     claims: u32,
     points: Vec<DVec2>,
+    /// The outline of the loop last returned, in its plane.
+    outline: Vec<DVec2>,
 }
 
 impl<'a> Cutter<'a> {
@@ -48,7 +50,13 @@ impl<'a> Cutter<'a> {
             claimed: vec![0; piece.mesh.vertex_count()],
             claims: 0,
             points: Vec::new(),
+            outline: Vec::new(),
         }
+    }
+
+    /// The outline of the loop that the last cut returned, in two axes of its plane.
+    pub(super) fn outline(&self) -> &[DVec2] {
+        &self.outline
     }
 
     /// Says whose sections the next cuts are for.
@@ -94,6 +102,7 @@ impl<'a> Cutter<'a> {
                     (found.holds_origin && !holds) || (found.holds_origin == *holds && key < *k)
                 });
                 if better {
+                    std::mem::swap(&mut self.points, &mut self.outline);
                     best = Some((found.holds_origin, key, found));
                 }
             }
