@@ -49,3 +49,12 @@ clients python="target/clients/bin/python": all
         {{python}} tests/clients/check_step.py topipe-out/$case/$case.step \
             --reference topipe-out/$case/$case-smooth.stl --gmsh 16,8,4,2 || exit 1; \
     done
+
+# SIGKILL at 300 random moments, of the engine with toy stages and of the command with real ones.
+kills rounds="300":
+    TOPIPE_KILLS={{rounds}} cargo test -p topipe-engine --test it killed
+    TOPIPE_KILLS={{rounds}} cargo test -p topipe --test command killed
+
+# Every class of files in a cache damaged at 1,000 random places.
+damage rounds="1000":
+    TOPIPE_DAMAGES={{rounds}} cargo test -p topipe-engine --test it random_damage

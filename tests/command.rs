@@ -456,6 +456,41 @@ fn an_interrupted_run_ends_with_130_and_the_next_one_finishes() {
     assert_eq!(events[1..3], ["stage-cached mesh", "stage-started smooth"]);
 }
 
+/// A signal ends a run whatever it is doing: here it waits for a file that nobody writes.
+#[cfg(unix)]
+#[test]
+fn a_run_that_cannot_stop_by_itself_is_ended() {
+    let shop = Workshop::new();
+    std::fs::remove_file(shop.path("box.off")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(shop.path("box.off")).status().unwrap().success());
+    for (signals, told) in [(&["-TERM"][..], "what was in work is dropped"), (&["-INT", "-INT"], "once more")]
+    {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
+            .current_dir(shop.folder.path())
+            .args(["run", "box.toml"])
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        // The handler is there before the pipeline is looked at; the process must have come so far.
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        for signal in signals {
+            assert!(
+                std::process::Command::new("kill")
+                    .arg(signal)
+                    .arg(child.id().to_string())
+                    .status()
+                    .unwrap()
+                    .success()
+            );
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        let mut stderr = String::new();
+        std::io::Read::read_to_string(&mut child.stderr.take().unwrap(), &mut stderr).unwrap();
+        assert!(stderr.contains(told), "{stderr}");
+    }
+}
+
 /// Whatever moment a process dies at, what it leaves is whole or not there.
 #[cfg(unix)]
 #[test]
@@ -471,18 +506,25 @@ fn killed_runs_leave_nothing_that_misleads_the_next_one() {
     let clean = Workshop::new();
     clean.events(&[]);
     let shop = Workshop::new();
-    for round in 0..16u64 {
+    // More of them with `just kills`.
+    let rounds = std::env::var("TOPIPE_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(16);
+    for round in 0..rounds {
         let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
             .current_dir(shop.folder.path())
             .args(["-q", "run", "box.toml"])
             .stderr(std::process::Stdio::null())
             .spawn()
             .unwrap();
-        std::thread::sleep(std::time::Duration::from_micros(1500 * round));
+        std::thread::sleep(std::time::Duration::from_micros(1500 * (7 * round % 32)));
         child.kill().unwrap();
         child.wait().unwrap();
     }
     let last = shop.topipe(&["run", "box.toml"]);
+    for folder in ["locks-v1", "leases-v1", "tmp"] {
+        assert_eq!(files_below(&shop.path(".topipe").join(folder)), Vec::<PathBuf>::new());
+    }
+    let outputs = |shop: &Workshop| files_below(&shop.path("topipe-out/box")).len();
+    assert_eq!(outputs(&shop), outputs(&clean));
     assert_eq!(last.code, 0, "{}", last.stderr);
     assert_eq!(names(&shop), names(&clean));
     assert_eq!(shop.events(&[]), NOTHING);

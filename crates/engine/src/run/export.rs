@@ -49,6 +49,9 @@ pub(super) fn write_all(executor: &Executor<'_>) -> Vec<ExportRecord> {
     let mut written = before.clone();
     let mut records = Vec::new();
     for export in executor.pipeline().exports.iter().filter(|export| executor.is_selected(export.stage)) {
+        if executor.interrupt.is_raised() {
+            break;
+        }
         let Some(artifact) = executor.artifact(export.stage) else {
             records.push(record(executor, export, ExportOutcome::Skipped, None));
             continue;

@@ -102,7 +102,9 @@ pub fn run(
     executor.remember();
 
     let stages = executor.into_records();
-    let code = exit_code(interrupt, &stages, &exports);
+    let expected =
+        pipeline.exports.iter().filter(|export| selection.selected.contains(&export.stage)).count();
+    let code = exit_code(interrupt, &stages, &exports, expected);
     let seconds = start.elapsed().as_secs_f64();
     let record = RunRecord {
         program: options.program.clone(),
@@ -125,7 +127,12 @@ pub fn run(
 }
 
 /// The exit code of a run: that of the first stage or export that failed.
-fn exit_code(interrupt: &Interrupt, stages: &[StageRecord], exports: &[ExportRecord]) -> ExitCode {
+fn exit_code(
+    interrupt: &Interrupt,
+    stages: &[StageRecord],
+    exports: &[ExportRecord],
+    expected: usize,
+) -> ExitCode {
     let failed = stages.iter().map(|stage| &stage.outcome).find_map(|outcome| match outcome {
         Outcome::Failed { code, .. } if *code != ExitCode::Interrupted => Some(*code),
         _ => None,
@@ -138,7 +145,7 @@ fn exit_code(interrupt: &Interrupt, stages: &[StageRecord], exports: &[ExportRec
     match (failed, unwritten) {
         (Some(code), _) => code,
         // A run that was asked to stop when everything was done already is done.
-        _ if interrupt.is_raised() && (unfinished || exports.is_empty()) => ExitCode::Interrupted,
+        _ if interrupt.is_raised() && (unfinished || exports.len() < expected) => ExitCode::Interrupted,
         (None, Some(code)) => code,
         (None, None) => ExitCode::Done,
     }

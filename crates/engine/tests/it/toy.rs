@@ -334,6 +334,8 @@ pub(crate) struct Workshop {
     /// Deletes the folder in the end, if it is ours.
     _owned: Option<tempfile::TempDir>,
     pub registry: Registry,
+    /// The file of the pipeline.
+    pub spec: String,
     pub options: RunOptions,
     pub interrupt: Interrupt,
 }
@@ -351,7 +353,14 @@ impl Workshop {
     /// The workshop that another process has made.
     pub(crate) fn at(folder: PathBuf) -> Self {
         let options = RunOptions::new(folder.join("out"));
-        Self { folder, _owned: None, registry: registry(), options, interrupt: Interrupt::new() }
+        Self {
+            folder,
+            _owned: None,
+            registry: registry(),
+            spec: "p.toml".into(),
+            options,
+            interrupt: Interrupt::new(),
+        }
     }
 
     pub(crate) fn folder(&self) -> &std::path::Path {
@@ -382,7 +391,7 @@ impl Workshop {
 
     pub(crate) fn pipeline(&self, sets: &[&str]) -> Pipeline {
         let overrides: Vec<Override> = sets.iter().map(|set| set.parse().unwrap()).collect();
-        match Pipeline::load(&self.path("p.toml"), &overrides, &self.registry) {
+        match Pipeline::load(&self.path(&self.spec), &overrides, &self.registry) {
             Ok(pipeline) => pipeline,
             Err(error) => panic!("{error}"),
         }

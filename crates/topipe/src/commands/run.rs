@@ -6,6 +6,7 @@ use crate::display::{self, Console, JsonLines};
 use crate::failure::Failure;
 use crate::stages::registry;
 use std::sync::Arc;
+use std::time::Duration;
 use topipe_engine::{
     ArtifactKind, ArtifactType, Cache, EventSink, ExitCode, Interrupt, Pipeline, RunRecord,
     run as run_pipeline,
@@ -35,15 +36,25 @@ pub(crate) fn run(arguments: &RunArguments, verbosity: Verbosity) -> Result<Exit
     Ok(record.code)
 }
 
-/// The first signal asks the run to stop, the second ends the process.
+/// How long a run may take to stop once it is asked to.
+const PATIENCE: Duration = Duration::from_millis(900);
+
+/// The first signal asks the run to stop, the second ends the process. A run that does not stop in time is ended as
+/// well: whatever moment that is, the cache is whole, and the next run removes what is left half done.
 fn stop_on_signal() -> Interrupt {
     let interrupt = Interrupt::new();
     let raised = interrupt.clone();
+    let end = || std::process::exit(i32::from(ExitCode::Interrupted.number()));
     let handler = move || {
         if raised.raise() {
-            std::process::exit(i32::from(ExitCode::Interrupted.number()));
+            end();
         }
         eprintln!("stopping; once more to stop at once");
+        std::thread::spawn(move || {
+            std::thread::sleep(PATIENCE);
+            eprintln!("stopped; what was in work is dropped, what was finished is kept");
+            end();
+        });
     };
     if let Err(error) = ctrlc::set_handler(handler) {
         tracing::warn!("the run cannot be interrupted cleanly: {error}");
