@@ -33,6 +33,29 @@ fn quality(mesh: &TriangleMesh) -> String {
     format!("folded {flipped}, dihedral <20/45/80/120/more {bins:?}, largest {largest:.1}")
 }
 
+/// Edges of more than 120 degrees by the number of frozen vertices among the four around them, and the folded faces by
+/// the number of their frozen vertices.
+fn spikes(mesh: &TriangleMesh, part: &Part) -> String {
+    let c = Connectivity::build(mesh).expect("a manifold");
+    let (mut edges, mut folded) = ([0usize; 5], [0usize; 4]);
+    for h in c.edges() {
+        let (f, g) = (h.face(), c.twin(h).face());
+        if mesh.normal(f).dot(mesh.normal(g)) < -0.5 {
+            let opposite = c.origin(c.twin(h).prev());
+            let mut four = mesh.triangles[f.index()].to_vec();
+            four.push(opposite);
+            edges[four.iter().filter(|v| part.frozen[v.index()]).count()] += 1;
+        }
+    }
+    for f in mesh.faces() {
+        let n: topipe_mesh::DVec3 = (0..3).map(|k| mesh.normal(c.neighbor(f, k))).sum();
+        if mesh.normal(f).dot(n.normalize_or_zero()) < -0.5 {
+            folded[mesh.triangles[f.index()].iter().filter(|v| part.frozen[v.index()]).count()] += 1;
+        }
+    }
+    format!("above 120 degrees with 0..4 frozen vertices {edges:?}, folded with 0..3 {folded:?}")
+}
+
 /// Percentiles of the dihedral angle inside the free surface, and of the smallest angle of its triangles.
 fn free_surface(mesh: &TriangleMesh, part: &Part) -> String {
     let c = Connectivity::build(mesh).expect("a manifold");
@@ -185,6 +208,7 @@ fn case(path: &str, parameters: &Parameters, write: Option<&str>) {
     );
     println!("  before: {}", quality(&part.mesh));
     println!("  after:  {}", quality(&smoothed.mesh));
+    println!("  after:  {}", spikes(&smoothed.mesh, &smoothed));
     println!("  free surface before: {}", free_surface(&part.mesh, &smoothed));
     println!("  free surface after:  {}", free_surface(&smoothed.mesh, &smoothed));
     if let Some(directory) = write {

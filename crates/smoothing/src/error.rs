@@ -106,6 +106,15 @@ pub enum SmoothingError {
         /// RMS step over the mean edge length.
         step: f64,
     },
+    /// Triangles pass through each other, and going back to the input does not part them.
+    #[error(
+        "{pairs} pairs of triangles pass through each other after smoothing, and going back to the input does not part \
+         them; set `keep_embedded = false` to have the result as it is"
+    )]
+    Crossings {
+        /// Pairs that were left.
+        pairs: usize,
+    },
     /// The run was stopped.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),

@@ -132,6 +132,11 @@ pub struct Parameters {
     pub hole_tolerance: f64,
     /// Smallest dihedral angle of a sharp feature edge between two frozen faces, degrees.
     pub sharp_angle: f64,
+    /// Blunt edges with a larger dihedral angle than this after the last iteration, degrees; 180 leaves them.
+    pub spike_angle: f64,
+    /// Look for triangles that pass through each other after smoothing, and take their vertices back towards the input
+    /// until none does.
+    pub keep_embedded: bool,
     /// Features to add, drop or pin, in this order: `{ action = "pin", shape = "hole", diameter = 6.0, space = { type =
     /// "cylinder", point = [0, 0, 0], axis = [0, 0, 1], length = 12.0, diameter = 8.0 } }`.
     pub features: Vec<FeatureOverride>,
@@ -161,6 +166,8 @@ impl Default for Parameters {
             plane_area: 10.0,
             hole_tolerance: 0.05,
             sharp_angle: 30.0,
+            spike_angle: 110.0,
+            keep_embedded: true,
             features: Vec::new(),
         }
     }
@@ -283,6 +290,13 @@ impl Parameters {
             (20.0..=180.0).contains(&self.sharp_angle),
             "between 20 and 180",
             "degrees; below 20 an edge is no feature by the definition of the report",
+        )?;
+        check(
+            "spike_angle",
+            self.spike_angle,
+            (90.0..=180.0).contains(&self.spike_angle),
+            "between 90 and 180",
+            "degrees; a block has edges of 90",
         )?;
         for (k, entry) in self.features.iter().enumerate() {
             if let Some(problem) = entry.problem() {

@@ -1,6 +1,7 @@
 //! The loop: freeze, step, project, restore the volume, stop.
 
 use crate::features::{self, Features};
+use crate::finish::{Finish, Mended};
 use crate::kernel::{Domain, Slide, change};
 use crate::methods;
 use crate::outline::OutlineGuard;
@@ -202,6 +203,32 @@ fn iterate(
         if rms < parameters.tolerance {
             record.converged = true;
             break;
+        }
+    }
+    if parameters.method != Method::Contract {
+        let finish = Finish {
+            mesh,
+            connectivity,
+            domain,
+            guard: &guard,
+            slides: {
+                let mut slides = vec![false; mesh.vertex_count()];
+                domain.slides.iter().for_each(|s| slides[s.vertex as usize] = true);
+                slides
+            },
+            spike: parameters.spike_angle.to_radians().cos(),
+            spikes: parameters.spike_angle < 180.0,
+            embedded: parameters.keep_embedded,
+            keep_volume: parameters.keeps_volume(),
+            edge,
+        };
+        let mended = finish.mend(&mut current, &mut keeper, progress)?;
+        if mended != Mended::default() {
+            progress.remark(&format!(
+                "{} edges were sharper than `spike_angle`, {} still are; {} pairs of triangles passed through each other \
+                 and were parted",
+                mended.spikes_before, mended.spikes_after, mended.crossings
+            ));
         }
     }
     record.total_change = change(original, &current).distances;

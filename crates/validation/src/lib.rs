@@ -45,8 +45,9 @@ pub use cylinder_fit::{CylinderFit, fit_cylinder};
 pub use error::ValidationError;
 pub use parameters::Parameters;
 pub use report::{
-    DeviationFigures, FeatureFigures, FlatFace, Hole, LayoutFigures, NormalJump, OriginalFigures,
-    RepairFigures, Report, SkeletonFigures, SmoothingFigures, SurfaceFigures,
+    DeviationFigures, DihedralFigures, FeatureFigures, FlatFace, Hole, KinkFigures, LayoutFigures,
+    NormalJump, OriginalFigures, RepairFigures, Report, ShapeFigures, SkeletonFigures, SmoothingFigures,
+    SurfaceFigures,
 };
 pub use skeleton::{BranchPoint, bounding_sphere, off_center};
 pub use surface::volume_by_quadrature;

@@ -68,7 +68,7 @@ pub struct DeviationFigures {
     pub max_at: [f64; 3],
 }
 
-/// A hole before and after.
+/// A hole, a boss or an arc of one, before and after.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Hole {
     /// Unit direction of the axis, after; its largest component is positive.
@@ -81,6 +81,11 @@ pub struct Hole {
     pub diameter_after_mm: f64,
     /// Largest distance of a vertex of the wall from that cylinder.
     pub roundness_mm: f64,
+    /// True for a hollow, false for a boss.
+    pub hollow: bool,
+    /// How far the wall goes around its axis: 360 less the widest gap between its vertices, or 360 where that is not
+    /// wider than a facet.
+    pub arc_deg: f64,
 }
 
 /// A plane face before and after.
@@ -96,6 +101,45 @@ pub struct FlatFace {
     pub flatness_before_mm: Option<f64>,
     /// The same now.
     pub flatness_after_mm: f64,
+}
+
+/// How sharp the edges of a mesh are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DihedralFigures {
+    /// Largest angle between the normals of two neighbouring faces.
+    pub max_deg: f64,
+    /// Edges by angle, in steps of ten degrees.
+    pub histogram: [usize; 18],
+    /// Faces whose normal is more than 120 degrees from the mean of their neighbours'.
+    pub folded_faces: usize,
+}
+
+/// Angle between the normals across edges where moved faces meet faces that did not move.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KinkFigures {
+    /// Such edges.
+    pub edges: usize,
+    /// Half are smaller.
+    pub median_deg: f64,
+    /// Nine in ten are smaller.
+    pub p90_deg: f64,
+    /// Largest.
+    pub max_deg: f64,
+}
+
+/// Edges, folds and crossings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShapeFigures {
+    /// The original; `null` where the triangles are not the same.
+    pub before: Option<DihedralFigures>,
+    /// The smoothed part.
+    pub after: DihedralFigures,
+    /// Along the border of what was frozen, in the original.
+    pub kink_before: Option<KinkFigures>,
+    /// And after smoothing; `null` where nothing is frozen.
+    pub kink_after: Option<KinkFigures>,
+    /// Pairs of triangles of the smoothed part that pass through each other.
+    pub self_intersections: usize,
 }
 
 /// The smoothed part.
@@ -119,8 +163,12 @@ pub struct SmoothingFigures {
     pub frozen_vertices: usize,
     /// Those of them that are not where they were, bit for bit: 0.
     pub frozen_moved: usize,
-    /// Holes.
+    /// Holes: hollow cylinders that go around their axis by 300 degrees or more.
     pub holes: Vec<Hole>,
+    /// The other cylinders: bosses and arcs.
+    pub cylinders: Vec<Hole>,
+    /// Edges, folds and crossings; `null` where the mesh is not an oriented manifold.
+    pub shape: Option<ShapeFigures>,
     /// Plane faces.
     pub flat_faces: Vec<FlatFace>,
     /// Smoothed part against original.

@@ -76,9 +76,34 @@ impl Report {
                     hole.diameter_after_mm
                 )?;
             }
+            if !s.cylinders.is_empty() {
+                let worst = s.cylinders.iter().map(|c| c.roundness_mm).fold(0.0, f64::max);
+                writeln!(
+                    text,
+                    "           {} bosses and arcs, round to {} mm",
+                    s.cylinders.len(),
+                    figure(worst)
+                )?;
+            }
             if !s.flat_faces.is_empty() {
                 let worst = s.flat_faces.iter().map(|f| f.flatness_after_mm).fold(0.0, f64::max);
                 writeln!(text, "           {} flat faces, flat to {} mm", s.flat_faces.len(), figure(worst))?;
+            }
+            if let Some(shape) = &s.shape {
+                let before =
+                    shape.before.as_ref().map_or_else(|| "?".to_owned(), |b| format!("{:.1}", b.max_deg));
+                writeln!(
+                    text,
+                    "           largest dihedral angle {before} -> {:.1} degrees, {} folded faces, {} self-intersections",
+                    shape.after.max_deg, shape.after.folded_faces, shape.self_intersections
+                )?;
+                if let Some(kink) = &shape.kink_after {
+                    writeln!(
+                        text,
+                        "           kink at the border of what is frozen: median {:.1}, 90 % below {:.1}, largest {:.1} degrees",
+                        kink.median_deg, kink.p90_deg, kink.max_deg
+                    )?;
+                }
             }
             if let Some(d) = &s.deviation {
                 writeln!(text, "           from the original: {}", deviation(d))?;

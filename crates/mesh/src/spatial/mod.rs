@@ -1,14 +1,17 @@
-//! Spatial queries on a triangle mesh: nearest point, ray, inside or outside, distance between two surfaces.
+//! Spatial queries on a triangle mesh: nearest point, ray, inside or outside, distance between two surfaces,
+//! where a surface passes through itself.
 //!
 //! Guarantees: answers are exact up to rounding (no approximate search), the same for any number of threads, and a
 //! query never allocates. Non-guarantees: a [`SurfaceIndex`] is a snapshot and does not follow a mesh that moves;
 //! [`SurfaceIndex::contains`] means something only for closed surfaces.
 
 mod bvh;
+mod crossing;
 mod deviation;
 mod triangle;
 
 pub(crate) use bvh::DIRECTIONS;
 pub use bvh::{NearestPoint, RayHit, SurfaceIndex};
+pub use crossing::{Crossing, crossings};
 pub use deviation::{Deviation, deviation};
 pub use triangle::closest_point_on_triangle;

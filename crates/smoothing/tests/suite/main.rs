@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod detection;
+mod embedding;
 mod guarantees;
 mod invariance;
 mod methods;

@@ -1,9 +1,13 @@
 //! The smoothed part against the original.
 
+mod angles;
 mod regions;
 
 use crate::{DeviationFigures, SmoothingFigures};
 use topipe_mesh::{Part, Provenance};
+
+/// A hollow that goes around its axis by less is a fillet or the end of a slot, degrees.
+const HOLE_ARC: f64 = 300.0;
 
 pub(crate) fn figures(original: &Part, part: &Part, deviation: Option<DeviationFigures>) -> SmoothingFigures {
     let record = part.smoothing.clone().unwrap_or_default();
@@ -12,6 +16,8 @@ pub(crate) fn figures(original: &Part, part: &Part, deviation: Option<DeviationF
     let total_change_mm = same_vertices.then(|| {
         part.mesh.positions.iter().zip(&original.mesh.positions).map(|(a, b)| a.distance(*b)).sum::<f64>()
     });
+    let (holes, cylinders) =
+        regions::cylinders(original, part).into_iter().partition(|c| c.hollow && c.arc_deg >= HOLE_ARC);
     SmoothingFigures {
         method: if part.smoothing.is_some() { record.method } else { "none".to_owned() },
         iterations: record.iterations,
@@ -22,7 +28,9 @@ pub(crate) fn figures(original: &Part, part: &Part, deviation: Option<DeviationF
         cumulative_change_mm: record.cumulative_change,
         frozen_vertices: part.frozen.iter().filter(|&&frozen| frozen).count(),
         frozen_moved: frozen_moved(original, part, same_vertices),
-        holes: regions::holes(original, part),
+        holes,
+        cylinders,
+        shape: angles::figures(original, part),
         flat_faces: regions::flat_faces(original, part),
         deviation,
     }

@@ -1,4 +1,4 @@
-//! Holes and plane faces, measured anew on the faces of their regions, before and after.
+//! Cylinders and plane faces, measured anew on the faces of their regions, before and after.
 
 use crate::cylinder_fit::{CylinderFit, fit_cylinder};
 use crate::{FlatFace, Hole};
@@ -24,20 +24,20 @@ fn points(mesh: &TriangleMesh, faces: &[FaceId]) -> Vec<DVec3> {
     vertices.into_iter().map(|v| mesh.position(v)).collect()
 }
 
-/// The holes of `part` and the same walls in `original`: by the same faces where the triangles are the same, else by
-/// the hole of the original whose axis runs through it.
-pub(super) fn holes(original: &Part, part: &Part) -> Vec<Hole> {
+/// The cylinders of `part` and the same walls in `original`: by the same faces where the triangles are the same, else
+/// by the cylinder of the original whose axis runs through it.
+pub(super) fn cylinders(original: &Part, part: &Part) -> Vec<Hole> {
     let same_triangles = original.mesh.triangles == part.mesh.triangles;
     let fits = |part: &Part, faces: &[Vec<FaceId>]| -> Vec<Option<CylinderFit>> {
         let fit = |(region, faces): (&topipe_mesh::Region, &Vec<FaceId>)| match region.shape {
-            RegionShape::Cylinder { axis, hole: true, .. } => fit_cylinder(&points(&part.mesh, faces), axis),
+            RegionShape::Cylinder { axis, .. } => fit_cylinder(&points(&part.mesh, faces), axis),
             _ => None,
         };
         part.regions.iter().zip(faces).map(fit).collect()
     };
     let faces = faces_of_regions(part);
     let others = if same_triangles { Vec::new() } else { fits(original, &faces_of_regions(original)) };
-    let mut holes = Vec::new();
+    let mut found = Vec::new();
     for (region, fit) in fits(part, &faces).into_iter().enumerate() {
         let Some(fit) = fit else { continue };
         let before = if same_triangles {
@@ -52,15 +52,33 @@ pub(super) fn holes(original: &Part, part: &Part) -> Vec<Hole> {
             })
         };
         let axis = if fit.axis.to_array()[largest_component(fit.axis)] < 0.0 { -fit.axis } else { fit.axis };
-        holes.push(Hole {
+        found.push(Hole {
             axis: axis.to_array(),
             point: fit.point.to_array(),
             diameter_before_mm: before.map(|b| 2.0 * b.radius),
             diameter_after_mm: 2.0 * fit.radius,
             roundness_mm: fit.residual,
+            hollow: matches!(part.regions[region].shape, RegionShape::Cylinder { hole: true, .. }),
+            arc_deg: arc(&points(&part.mesh, &faces[region]), &fit),
         });
     }
-    holes
+    found
+}
+
+/// How far points go around the axis of their cylinder, degrees.
+fn arc(points: &[DVec3], fit: &CylinderFit) -> f64 {
+    let (u, v) = fit.axis.any_orthonormal_pair();
+    let angle = |p: &DVec3| {
+        let d = *p - fit.point;
+        d.dot(v).atan2(d.dot(u)).to_degrees()
+    };
+    let mut angles: Vec<f64> = points.iter().map(angle).collect();
+    angles.sort_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (angles.first(), angles.last()) else { return 0.0 };
+    let gaps = angles.windows(2).map(|w| w[1] - w[0]);
+    let widest = gaps.fold(first + 360.0 - last, f64::max);
+    // A hole with six sides is the coarsest that is taken for round.
+    if widest <= 75.0 { 360.0 } else { 360.0 - widest }
 }
 
 fn largest_component(v: DVec3) -> usize {

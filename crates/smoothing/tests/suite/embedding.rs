@@ -1,0 +1,59 @@
+//! No spike, no fold, no triangle through another.
+
+use crate::{CASES, read, smoothed};
+use topipe_mesh::spatial::crossings;
+use topipe_mesh::{Connectivity, Part, TriangleMesh};
+use topipe_smoothing::{Method, Parameters};
+
+/// Edges with a dihedral angle of more than 120 degrees, and the largest angle.
+fn sharp(mesh: &TriangleMesh) -> (usize, f64) {
+    let connectivity = Connectivity::build(mesh).expect("a manifold");
+    let angles = connectivity
+        .edges()
+        .map(|h| mesh.normal(h.face()).angle_between(mesh.normal(connectivity.twin(h).face())).to_degrees());
+    angles.fold((0, 0.0), |(count, largest), a| (count + usize::from(a > 120.0), f64::max(largest, a)))
+}
+
+#[test]
+fn no_triangle_passes_through_another() {
+    for case in CASES {
+        let result = smoothed(&read(case), &Parameters::default());
+        assert_eq!(crossings(&result.mesh), [], "{case}");
+    }
+}
+
+#[test]
+fn crossings_go_back_towards_the_input_until_there_is_none() {
+    // Collapsing thin struts pass through each other.
+    let part = read("bracket");
+    let parameters = Parameters {
+        method: Method::Laplacian,
+        iterations: Some(60),
+        preserve_volume: Some(true),
+        keep_embedded: false,
+        spike_angle: 180.0,
+        ..Parameters::default()
+    };
+    let torn = smoothed(&part, &parameters);
+    assert!(!crossings(&torn.mesh).is_empty());
+    let whole = smoothed(&part, &Parameters { keep_embedded: true, ..parameters });
+    assert_eq!(crossings(&whole.mesh), []);
+    assert!((whole.mesh.volume() / part.mesh.volume() - 1.0).abs() <= 1e-12);
+    assert_eq!(torn.frozen, whole.frozen);
+    let moved =
+        |a: &Part, b: &Part| a.mesh.positions.iter().zip(&b.mesh.positions).filter(|(p, q)| p != q).count();
+    assert!(moved(&torn, &whole) > 0);
+}
+
+#[test]
+fn spikes_are_blunted() {
+    for case in ["bracket", "support", "beam-two-holes", "y-form"] {
+        let part = read(case);
+        let left = smoothed(&part, &Parameters { spike_angle: 180.0, ..Parameters::default() });
+        let blunt = smoothed(&part, &Parameters::default());
+        let (before, with, without) = (sharp(&part.mesh), sharp(&blunt.mesh), sharp(&left.mesh));
+        assert!(with.0 * 2 <= without.0, "{case}: {} of {} edges", with.0, without.0);
+        assert!(with.0 * 20 <= before.0, "{case}: {} of {} edges", with.0, before.0);
+        assert!(with.1 < before.1 - 15.0, "{case}: largest angle {} of {}", with.1, before.1);
+    }
+}
