@@ -127,4 +127,65 @@ mod tests {
         let length: f64 = surface.edges.iter().map(EdgeCurve::length).sum();
         assert!((length / (4.0 * PI * (outer + inner)) - 1.0).abs() < 1e-12);
     }
+
+    #[test]
+    fn a_tube_is_tessellated_watertight_and_within_its_tolerance() {
+        let (axis, center) = (DVec3::new(0.3, 1.0, -2.0).normalize(), DVec3::new(1.0, 2.0, 3.0));
+        let surface = tube(axis, center, 5.0, 3.0, 7.0);
+        let exact = surface.volume();
+        let mut before = f64::INFINITY;
+        for tolerance in [2.0, 0.1, 1e-3] {
+            let (mesh, face_of_triangle) = surface.tessellate_with(tolerance, f64::INFINITY);
+            let connectivity = topipe_mesh::Connectivity::build(&mesh).unwrap();
+            assert!(connectivity.is_closed());
+            assert_eq!(connectivity.genus(&mesh), Some(1));
+            // Every edge of every triangle near its face: at the middle, where chords are farthest off.
+            for (triangle, &face) in mesh.triangles.iter().zip(&face_of_triangle) {
+                for k in 0..3 {
+                    let (a, b) = (mesh.position(triangle[k]), mesh.position(triangle[(k + 1) % 3]));
+                    let off = surface.faces[face as usize].shape.distance((a + b) / 2.0).abs();
+                    assert!(off <= tolerance * 1.001, "{off} for {tolerance}");
+                }
+            }
+            let error = (mesh.volume() / exact - 1.0).abs();
+            assert!(error < before / 4.0 && error < 0.3, "{error}");
+            before = error;
+        }
+        let (mesh, _) = surface.tessellate_with(0.1, 1.0);
+        assert!(topipe_mesh::Connectivity::build(&mesh).unwrap().is_closed());
+        assert!(mesh.area() > 0.95 * surface.faces.iter().map(|f| f.area(&surface.edges)).sum::<f64>());
+    }
+
+    #[test]
+    fn rims_become_whole_circles_with_aligned_vertices() {
+        let axis = DVec3::new(0.3, 1.0, -2.0).normalize();
+        let mut surface = tube(axis, DVec3::ONE, 5.0, 3.0, 7.0);
+        let volume = surface.volume();
+        // Other vertices on the upper rims than above the lower ones.
+        crate::simplify::simplify(&mut surface, 1e-8);
+        assert_eq!((surface.vertices.len(), surface.edges.len()), (4, 4));
+        for edge in &surface.edges {
+            assert_eq!(edge.ends[0], edge.ends[1]);
+            assert_eq!(edge.sweep(), Some(2.0 * PI));
+        }
+        for face in &surface.faces {
+            assert!(face.loops.iter().all(|l| l.len() == 1) && face.loops.len() == 2);
+            if let RegionShape::Cylinder { .. } = face.shape {
+                let [p, q] = [0, 1].map(|l| surface.edges[face.loops[l][0].edge as usize].control[0]);
+                assert!((p - q).reject_from_normalized(axis).length() < 1e-12, "one ruling");
+                assert_eq!(face.winding(&surface.edges).abs(), 0, "once to and once fro");
+            }
+        }
+        assert!((surface.volume() / volume - 1.0).abs() < 1e-12);
+        let mut file = Vec::new();
+        crate::step::write(&surface, "tube", crate::step::Protocol::Ap242, &mut file).unwrap();
+        let file = String::from_utf8(file).unwrap();
+        let count = |what: &str| file.matches(what).count();
+        assert_eq!(count("=CIRCLE("), 4);
+        // Two seams, each run in both directions.
+        assert_eq!((count("=LINE("), count("=EDGE_CURVE("), count("=ORIENTED_EDGE(")), (2, 6, 12));
+        assert_eq!((count("=PLANE("), count("=CYLINDRICAL_SURFACE(")), (2, 2));
+        assert_eq!((count("'hole 1, diameter 6 mm'"), count("'boss 1, diameter 10 mm'")), (1, 1));
+        assert!(file.contains("AP242_MANAGED_MODEL_BASED_3D_ENGINEERING"));
+    }
 }

@@ -18,7 +18,7 @@ mod smoothing_curve;
 
 use crate::{AnalyticFace, EdgeCurve, PatchSide, SplineFitError};
 use glam::DMat3;
-use topipe_mesh::{Connectivity, DVec3, RegionId, RegionShape};
+use topipe_mesh::{Connectivity, DVec3, RegionId, RegionShape, TriangleMesh};
 use topipe_quad_matching::QuadLayout;
 
 /// Curves stay within this share of the part's diagonal of the shapes they lie on: 1e-7 mm on a part of 200 mm.
@@ -87,8 +87,9 @@ pub(crate) fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
             shape,
         });
     }
-    for chain in chains::chains(layout, &sides, &borders.curves) {
-        outline::fit(layout, &chain, &shapes[chain.region.index()], &mut borders);
+    let grain = grain(&layout.part.mesh);
+    for chain in chains::chains(layout, &sides, &borders.curves, grain) {
+        outline::fit(layout, &chain, &shapes[chain.region.index()], grain, &mut borders);
     }
     let connectivity =
         Connectivity::build(&layout.part.mesh).map_err(|error| SplineFitError::Layout(error.to_string()))?;
@@ -98,6 +99,19 @@ pub(crate) fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
         }
     }
     Ok(borders)
+}
+
+/// The length of an edge of a face at a random place of the surface, mm. Cuts leave many short edges beside them, which
+/// hardly count here: it is about the mean edge length of the mesh before it was cut.
+fn grain(mesh: &TriangleMesh) -> f64 {
+    let (mut sum, mut area) = (0.0, 0.0);
+    for f in mesh.faces() {
+        let [a, b, c] = mesh.corners(f);
+        let weight = mesh.area_vector(f).length();
+        sum += weight * (a.distance(b) + b.distance(c) + c.distance(a)) / 3.0;
+        area += weight;
+    }
+    if area > 0.0 { sum / area } else { 0.0 }
 }
 
 /// The regions beside an edge: of the loop that runs along it, and of the loop that runs against it.

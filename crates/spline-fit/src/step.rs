@@ -9,6 +9,7 @@
 
 mod entities;
 mod geometry;
+mod pcurves;
 mod seams;
 mod style;
 

@@ -1,10 +1,12 @@
 //! A watertight triangle mesh of a surface, to a chord tolerance.
 //!
-//! Each edge curve is divided once, and both of its patches use those points. Inside, a patch has a grid of its own;
-//! a strip of triangles joins the grid to the four sides.
+//! Each edge curve is divided once, and both of its faces use those points. Inside, a patch has a grid of its own;
+//! a strip of triangles joins the grid to the four sides. A face of known shape is triangulated between its borders.
 
-use crate::{Patch, SplineSurface};
-use topipe_mesh::{DVec3, TriangleMesh, VertexId};
+mod trimmed;
+
+use crate::{CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface};
+use topipe_mesh::{DVec3, RegionShape, TriangleMesh, VertexId};
 
 /// Divisions of one edge or one side of a patch's grid at the most: finer than that is a tolerance out of reach.
 const MOST: usize = 256;
@@ -19,45 +21,111 @@ fn divisions(control: impl Iterator<Item = DVec3>, degree: usize, spans: usize, 
     ((second / (8.0 * tolerance)).sqrt().ceil() as usize).clamp(1, MOST)
 }
 
+/// Divisions of an edge: a line has none, an arc as many as its chords need.
+fn edge_divisions(edge: &EdgeCurve, tolerance: f64) -> usize {
+    match (edge.shape, edge.sweep()) {
+        (CurveShape::Line, _) => 1,
+        (CurveShape::Arc { radius, .. }, Some(sweep)) => {
+            // A closed circle needs three points to be one.
+            let least = if edge.ends[0] == edge.ends[1] { 3.0 } else { 1.0 };
+            (sweep / widest(radius, tolerance)).ceil().clamp(least, 4.0 * MOST as f64) as usize
+        }
+        _ => {
+            let spans = edge.basis.breaks().len() - 1;
+            let count = divisions(edge.control.iter().copied(), edge.basis.degree(), spans, tolerance);
+            count.max(if edge.ends[0] == edge.ends[1] { 3 } else { 1 })
+        }
+    }
+}
+
+/// The angle of the longest chord that is no farther than `tolerance` from a circle, at most an eighth of a turn: a
+/// coarse tolerance still leaves a hole.
+fn widest(radius: f64, tolerance: f64) -> f64 {
+    (2.0 * (1.0 - tolerance / radius).max(0.0).acos()).clamp(1e-6, std::f64::consts::FRAC_PI_4)
+}
+
+/// How often the tolerance is made four times finer when borders cross because they are sampled too coarsely.
+const REFINEMENTS: u32 = 4;
+
 impl SplineSurface {
     /// Triangles whose distance from the surface is about `chord_tolerance` (mm) at the most.
     ///
     /// Guarantees: a closed surface gives a closed mesh, oriented alike, with shared vertices. The tolerance is an
-    /// estimate from the control points; at most 256 divisions are made per patch side.
+    /// estimate from the control points; at most 256 divisions are made per patch side. Where the borders of a face
+    /// would cross each other, everything is sampled more finely; a face whose borders cross however finely they are
+    /// sampled is left out, and the mesh is open there.
     pub fn tessellate(&self, chord_tolerance: f64) -> TriangleMesh {
-        let tolerance = if chord_tolerance > 0.0 { chord_tolerance } else { f64::MIN_POSITIVE };
+        self.tessellate_with(chord_tolerance, f64::INFINITY).0
+    }
+
+    /// The same, with no edge inside an analytic face longer than `longest` (mm), and the face of each triangle:
+    /// patches first, then analytic faces.
+    pub fn tessellate_with(&self, chord_tolerance: f64, longest: f64) -> (TriangleMesh, Vec<u32>) {
+        let mut tolerance = if chord_tolerance > 0.0 { chord_tolerance } else { f64::MIN_POSITIVE };
+        for _ in 0..REFINEMENTS {
+            let (mesh, face_of_triangle, complete) = self.triangles(tolerance, longest);
+            if complete {
+                return (mesh, face_of_triangle);
+            }
+            tolerance /= 4.0;
+        }
+        let (mesh, face_of_triangle, _) = self.triangles(tolerance, longest);
+        (mesh, face_of_triangle)
+    }
+
+    fn triangles(&self, tolerance: f64, longest: f64) -> (TriangleMesh, Vec<u32>, bool) {
         let mut mesh = TriangleMesh { positions: self.vertices.clone(), triangles: Vec::new() };
         // Points along each edge, ends included, as mesh vertices.
         let edges: Vec<Vec<VertexId>> = self
             .edges
             .iter()
             .map(|edge| {
-                let spans = edge.basis.breaks().len() - 1;
-                let count = divisions(edge.control.iter().copied(), edge.basis.degree(), spans, tolerance);
+                let count = edge_divisions(edge, tolerance);
                 let mut points = vec![VertexId(edge.ends[0])];
                 for k in 1..count {
                     points.push(VertexId::new(mesh.positions.len()));
-                    mesh.positions.push(edge.position(k as f64 / count as f64));
+                    mesh.positions.push(edge.exact(k as f64 / count as f64).position);
                 }
                 points.push(VertexId(edge.ends[1]));
                 points
             })
             .collect();
-        for patch in &self.patches {
-            let sides: Vec<Vec<VertexId>> = patch
-                .sides
+        let along = |side: &PatchSide| {
+            let mut points = edges[side.edge as usize].clone();
+            if side.reversed {
+                points.reverse();
+            }
+            points
+        };
+        let mut face_of_triangle = Vec::new();
+        for (p, patch) in self.patches.iter().enumerate() {
+            let sides: Vec<Vec<VertexId>> = patch.sides.iter().map(along).collect();
+            add_patch(&mut mesh, patch, &sides, tolerance);
+            face_of_triangle.resize(mesh.triangles.len(), p as u32);
+        }
+        let mut complete = true;
+        for (f, face) in self.faces.iter().enumerate() {
+            let loops: Vec<Vec<VertexId>> = face
+                .loops
                 .iter()
-                .map(|side| {
-                    let mut points = edges[side.edge as usize].clone();
-                    if side.reversed {
-                        points.reverse();
+                .map(|around| {
+                    let mut points = Vec::new();
+                    for side in around {
+                        let mut piece = along(side);
+                        piece.pop();
+                        points.extend(piece);
                     }
                     points
                 })
                 .collect();
-            add_patch(&mut mesh, patch, &sides, tolerance);
+            let angle = match face.shape {
+                RegionShape::Plane { .. } => f64::INFINITY,
+                RegionShape::Cylinder { radius, .. } => widest(radius, tolerance),
+            };
+            complete &= trimmed::add(&mut mesh, &face.shape, &loops, angle, longest);
+            face_of_triangle.resize(mesh.triangles.len(), (self.patches.len() + f) as u32);
         }
-        mesh
+        (mesh, face_of_triangle, complete)
     }
 }
 

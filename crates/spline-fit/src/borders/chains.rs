@@ -13,13 +13,18 @@ pub(super) struct Chain {
     pub(super) closed: bool,
 }
 
-/// A border turns a corner where its directions before and after, each over a length of this many mean edges, differ
+/// A border turns a corner where its directions before and after, each over a length of this many edges of the mesh, differ
 /// by more than `CORNER_ANGLE` degrees. Shorter and smaller turns are the teeth of the mesh.
-const CORNER_REACH: f64 = 2.0;
-const CORNER_ANGLE: f64 = 50.0;
+const CORNER_REACH: f64 = 3.0;
+const CORNER_ANGLE: f64 = 60.0;
 
 /// All chains of edges beside a region that have no curve yet.
-pub(super) fn chains(layout: &QuadLayout, sides: &[Beside], curves: &[Option<EdgeCurve>]) -> Vec<Chain> {
+pub(super) fn chains(
+    layout: &QuadLayout,
+    sides: &[Beside],
+    curves: &[Option<EdgeCurve>],
+    grain: f64,
+) -> Vec<Chain> {
     // Regions around each vertex: where there is more than one, the vertex is where shapes meet and stays.
     let mut regions: Vec<Vec<RegionId>> = vec![Vec::new(); layout.vertices.len()];
     // How many border sides leave each vertex: more than one of the same region where it touches itself.
@@ -33,7 +38,7 @@ pub(super) fn chains(layout: &QuadLayout, sides: &[Beside], curves: &[Option<Edg
             }
         }
     }
-    let reach = CORNER_REACH * layout.part.mesh.mean_edge_length();
+    let reach = CORNER_REACH * grain;
     let mut done = vec![false; layout.edges.len()];
     let mut chains = Vec::new();
     for face in &layout.region_faces {

@@ -15,11 +15,11 @@ use std::f64::consts::PI;
 use topipe_mesh::{DVec3, RegionShape};
 use topipe_quad_matching::QuadLayout;
 
-/// Waves of the border shorter than this many mean edge lengths are teeth of the mesh and damped to less than half.
+/// Waves of the border shorter than this many edges of the mesh are teeth of the mesh and damped to less than half.
 const SHORTEST_WAVE: f64 = 4.0;
-/// Spans of the reference curve are at most this many mean edge lengths long.
+/// Spans of the reference curve are at most this many edges of the mesh long.
 const FINEST_SPAN: f64 = 2.0;
-/// Spans are joined as long as the curve moves by less than this share of the mean edge length.
+/// Spans are joined as long as the curve moves by less than this share of an edge of the mesh.
 const COARSENING: f64 = 0.01;
 const MOST_SPANS: usize = 64;
 
@@ -86,11 +86,16 @@ impl Development {
 }
 
 /// Fits the chain; sets its curves, and the vertices inside it.
-pub(super) fn fit(layout: &QuadLayout, chain: &Chain, shape: &RegionShape, borders: &mut Borders) {
+pub(super) fn fit(
+    layout: &QuadLayout,
+    chain: &Chain,
+    shape: &RegionShape,
+    grain: f64,
+    borders: &mut Borders,
+) {
     let development = Development::new(shape);
-    let edge_length = layout.part.mesh.mean_edge_length();
     let outline = Outline::new(layout, chain, &development, borders);
-    let Some(curve) = outline.curve(chain, edge_length) else { return };
+    let Some(curve) = outline.curve(chain, grain) else { return };
 
     // Vertices inside the chain move onto the curve.
     let count = chain.sides.len();
@@ -106,15 +111,8 @@ pub(super) fn fit(layout: &QuadLayout, chain: &Chain, shape: &RegionShape, borde
             Some(radius) => {
                 let circle =
                     Circle { center: development.origin, u: development.u, v: development.v, radius };
-                around_piece(
-                    &development,
-                    &circle,
-                    &curve,
-                    range,
-                    borders.tolerance,
-                    COARSENING * edge_length,
-                )
-                .or_else(|| cylinder_piece(&development, &curve, range, borders.tolerance))
+                around_piece(&development, &circle, &curve, range, borders.tolerance, COARSENING * grain)
+                    .or_else(|| cylinder_piece(&development, &curve, range, borders.tolerance))
             }
         };
         let Some((basis, mut control)) = found else { continue };
@@ -167,7 +165,7 @@ impl Outline {
     }
 
     /// The smoothing spline with as few spans as keep it.
-    fn curve(&self, chain: &Chain, edge_length: f64) -> Option<Curve> {
+    fn curve(&self, chain: &Chain, grain: f64) -> Option<Curve> {
         let length = self.along[self.along.len() - 1];
         if !(length > 0.0 && self.starts.windows(2).all(|w| w[0] < w[1])) {
             return None;
@@ -188,12 +186,12 @@ impl Outline {
             }
         }
         let ends = (!chain.closed).then_some([first, last]);
-        let mu = (SHORTEST_WAVE * edge_length / (2.0 * PI)).powi(4);
+        let mu = (SHORTEST_WAVE * grain / (2.0 * PI)).powi(4);
         let finest: Vec<usize> = self
             .starts
             .windows(2)
             .map(|w| {
-                let wanted = (w[1] - w[0]) / (FINEST_SPAN * edge_length);
+                let wanted = (w[1] - w[0]) / (FINEST_SPAN * grain);
                 (1..).map(|k| 1 << k).find(|&n| n as f64 >= wanted || n >= MOST_SPANS).unwrap_or(1)
             })
             .collect();
@@ -217,7 +215,7 @@ impl Outline {
                     .fold(0.0, f64::max)
             };
             match with(shift) {
-                Some(coarser) if moved(&coarser) <= COARSENING * edge_length => best = coarser,
+                Some(coarser) if moved(&coarser) <= COARSENING * grain => best = coarser,
                 _ => break,
             }
         }

@@ -11,11 +11,12 @@ pub(super) struct Entities<'a, W: Write> {
     next: u64,
     /// Points by their coordinates: what is the same place bit for bit is one entity.
     points: HashMap<[u64; 3], u64>,
+    plane_context: Option<u64>,
 }
 
 impl<'a, W: Write> Entities<'a, W> {
     pub(super) fn new(out: &'a mut W) -> Self {
-        Self { out, next: 1, points: HashMap::new() }
+        Self { out, next: 1, points: HashMap::new(), plane_context: None }
     }
 
     pub(super) fn add(&mut self, entity: &str) -> io::Result<u64> {
@@ -37,6 +38,18 @@ impl<'a, W: Write> Entities<'a, W> {
 
     pub(super) fn direction(&mut self, d: DVec3) -> io::Result<u64> {
         self.add(&format!("DIRECTION('',({},{},{}))", real(d.x), real(d.y), real(d.z)))
+    }
+
+    /// The context of curves in the parameters of a surface.
+    pub(super) fn plane_context(&mut self) -> io::Result<u64> {
+        if let Some(id) = self.plane_context {
+            return Ok(id);
+        }
+        let id = self.add(
+            "(GEOMETRIC_REPRESENTATION_CONTEXT(2)PARAMETRIC_REPRESENTATION_CONTEXT()REPRESENTATION_CONTEXT('2D SPACE',''))",
+        )?;
+        self.plane_context = Some(id);
+        Ok(id)
     }
 
     /// A coordinate system with the given third and first axes.

@@ -1,6 +1,7 @@
 //! Vertices, edges and faces.
 
 use super::entities::{Entities, knots, real, references};
+use super::pcurves::{self, Frame};
 use super::seams::{End, Seam, seam};
 use super::style::names;
 use crate::{AnalyticFace, CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface};
@@ -26,6 +27,21 @@ pub(super) fn write<W: Write>(file: &mut Entities<'_, W>, surface: &SplineSurfac
     let high = surface.vertices.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
     let near = SAME_RULING * (high - low).length();
     let seams: Vec<Option<Seam>> = surface.faces.iter().map(|face| seam(surface, face, near)).collect();
+    let mut shapes = Vec::with_capacity(surface.faces.len());
+    // The faces on which an edge needs a curve in their parameters: see there.
+    let mut on_cylinders: Vec<Vec<usize>> = vec![Vec::new(); surface.edges.len()];
+    for (f, (face, seam)) in surface.faces.iter().zip(&seams).enumerate() {
+        let shape = shape(file, surface, face, seam.as_ref())?;
+        if shape.frame.is_some() {
+            for side in face.loops.iter().flatten() {
+                let edge = side.edge as usize;
+                if surface.edges[edge].shape == CurveShape::Spline && !on_cylinders[edge].contains(&f) {
+                    on_cylinders[edge].push(f);
+                }
+            }
+        }
+        shapes.push(shape);
+    }
     // Where seams end inside of edges, these are written in pieces.
     let mut cuts: Vec<Vec<(f64, u64)>> = vec![Vec::new(); surface.edges.len()];
     let mut seam_edges: Vec<Option<(u64, Seam)>> = Vec::with_capacity(seams.len());
@@ -55,12 +71,24 @@ pub(super) fn write<W: Write>(file: &mut Entities<'_, W>, surface: &SplineSurfac
         let curve = curve(file, edge)?;
         let [a, b] = edge.ends.map(|v| vertices[v as usize]);
         cuts[e].sort_by(|x, y| x.0.total_cmp(&y.0));
-        let mut stops = vec![a];
-        stops.extend(cuts[e].iter().map(|&(_, vertex)| vertex));
-        stops.push(b);
+        let mut stops = vec![(0.0, a)];
+        stops.extend(&cuts[e]);
+        stops.push((1.0, b));
         let mut pieces = Vec::with_capacity(stops.len() - 1);
         for w in stops.windows(2) {
-            pieces.push(file.add(&format!("EDGE_CURVE('',#{},#{},#{curve},.T.)", w[0], w[1]))?);
+            let ((from, a), (to, b)) = (w[0], w[1]);
+            let mut parameter_curves = Vec::new();
+            for &f in &on_cylinders[e] {
+                let Some(frame) = &shapes[f].frame else { continue };
+                parameter_curves.extend(pcurves::write(file, edge, frame, (from + to) / 2.0, shapes[f].id)?);
+            }
+            let curve = if parameter_curves.is_empty() {
+                curve
+            } else {
+                let list = references(&parameter_curves);
+                file.add(&format!("SURFACE_CURVE('',#{curve},{list},.CURVE_3D.)"))?
+            };
+            pieces.push(file.add(&format!("EDGE_CURVE('',#{a},#{b},#{curve},.T.)"))?);
         }
         edges.push(pieces);
     }
@@ -71,8 +99,9 @@ pub(super) fn write<W: Write>(file: &mut Entities<'_, W>, surface: &SplineSurfac
         let bound = file.add(&format!("FACE_OUTER_BOUND('',#{wire},.T.)"))?;
         faces.patches.push(file.add(&format!("ADVANCED_FACE('free surface',(#{bound}),#{spline},.T.)"))?);
     }
-    for ((face, name), seam) in surface.faces.iter().zip(names(surface)).zip(&seam_edges) {
-        let (shape, sense) = shape(file, surface, face, seam.as_ref().map(|(_, seam)| seam))?;
+    for (((face, name), seam), shape) in
+        surface.faces.iter().zip(names(surface)).zip(&seam_edges).zip(&shapes)
+    {
         let mut bounds = Vec::with_capacity(face.loops.len());
         let mut cut = [usize::MAX; 2];
         if let Some((id, seam)) = seam {
@@ -90,9 +119,12 @@ pub(super) fn write<W: Write>(file: &mut Entities<'_, W>, surface: &SplineSurfac
             let kind = if is_outer(face, around, &surface.edges) { "FACE_OUTER_BOUND" } else { "FACE_BOUND" };
             bounds.push(file.add(&format!("{kind}('',#{wire},.T.)"))?);
         }
-        faces
-            .analytic
-            .push(file.add(&format!("ADVANCED_FACE('{name}',{},#{shape},{sense})", references(&bounds)))?);
+        faces.analytic.push(file.add(&format!(
+            "ADVANCED_FACE('{name}',{},#{},{})",
+            references(&bounds),
+            shape.id,
+            shape.sense
+        ))?);
     }
     Ok(faces)
 }
@@ -192,17 +224,25 @@ fn oriented<W: Write>(file: &mut Entities<'_, W>, edges: &[Oriented]) -> io::Res
     file.add(&format!("EDGE_LOOP('',{})", references(&around)))
 }
 
-/// The surface, and whether its normal points out of the material.
+/// A plane or cylinder in the file.
+struct Shape {
+    id: u64,
+    /// Whether its normal points out of the material.
+    sense: &'static str,
+    /// Of a cylinder.
+    frame: Option<Frame>,
+}
+
 fn shape<W: Write>(
     file: &mut Entities<'_, W>,
     surface: &SplineSurface,
     face: &AnalyticFace,
     seam: Option<&Seam>,
-) -> io::Result<(u64, &'static str)> {
+) -> io::Result<Shape> {
     match face.shape {
         RegionShape::Plane { point, normal } => {
             let placement = file.placement(point, normal, normal.any_orthonormal_vector())?;
-            Ok((file.add(&format!("PLANE('',#{placement})"))?, ".T."))
+            Ok(Shape { id: file.add(&format!("PLANE('',#{placement})"))?, sense: ".T.", frame: None })
         }
         RegionShape::Cylinder { point, axis, radius, hole } => {
             // The angle is counted from the seam, or from the side away from a face that does not go around.
@@ -219,8 +259,9 @@ fn shape<W: Write>(
             };
             let start = start.try_normalize().unwrap_or(axis.any_orthonormal_vector());
             let placement = file.placement(point, axis, start)?;
-            let surface = file.add(&format!("CYLINDRICAL_SURFACE('',#{placement},{})", real(radius)))?;
-            Ok((surface, if hole { ".F." } else { ".T." }))
+            let id = file.add(&format!("CYLINDRICAL_SURFACE('',#{placement},{})", real(radius)))?;
+            let frame = Frame { point, axis, start, radius };
+            Ok(Shape { id, sense: if hole { ".F." } else { ".T." }, frame: Some(frame) })
         }
     }
 }
