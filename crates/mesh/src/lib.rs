@@ -7,7 +7,8 @@
 //!
 //! Lengths are in millimetres once a mesh has been imported; nothing in this crate depends on that.
 
-pub mod connectivity;
+pub mod coarsen;
+mod connectivity;
 pub mod disk_map;
 pub mod ids;
 pub mod import;

@@ -12,12 +12,12 @@ use std::collections::HashMap;
 /// A part under refinement. Provenance and parent faces refer to the part it was made from.
 #[derive(Debug, Clone)]
 pub struct Refiner {
-    part: Part,
-    twin: Vec<HalfEdgeId>,
-    outgoing: Vec<HalfEdgeId>,
-    parent_face: Vec<FaceId>,
-    parent_triangles: Vec<[VertexId; 3]>,
-    features: HashMap<[VertexId; 2], FeatureKind>,
+    pub(crate) part: Part,
+    pub(crate) twin: Vec<HalfEdgeId>,
+    pub(crate) outgoing: Vec<HalfEdgeId>,
+    pub(crate) parent_face: Vec<FaceId>,
+    pub(crate) parent_triangles: Vec<[VertexId; 3]>,
+    pub(crate) features: HashMap<[VertexId; 2], FeatureKind>,
 }
 
 /// What a split made: the new vertex, and each new face with the face it was cut from.
@@ -102,7 +102,7 @@ impl Refiner {
     }
 
     /// The weights of a vertex with respect to the corners of a parent face it lies in or on.
-    fn weights(&self, vertex: VertexId, parent: FaceId) -> [f64; 3] {
+    pub(crate) fn weights(&self, vertex: VertexId, parent: FaceId) -> [f64; 3] {
         let corners = self.parent_triangles[parent.index()];
         let mut weights = [0.0; 3];
         let mut add = |v: VertexId, w: f64| {

@@ -24,6 +24,7 @@ mod outlines;
 mod pairing;
 mod parameters;
 mod refine;
+mod relax;
 mod sides;
 mod spokes;
 mod straighten;

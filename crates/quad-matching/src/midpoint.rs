@@ -4,11 +4,14 @@
 //! even count, works with borders, and leaves corners of 360 / n degrees at centres and about 90 at middles.
 
 use crate::outlines::outlines;
-use crate::refine::{Quads, refine};
-use crate::straighten::straighten;
+use crate::refine::{Quads, Regions, refine};
+use crate::relax::relax;
 use crate::{Parameters, QuadLayout, QuadMatchingError, RegionFace, Side};
 use topipe_progress::Progress;
 use topipe_tiling::Tiling;
+
+/// Rounds in which vertices beside bad corners are relaxed.
+const RELAXATION_ROUNDS: u32 = 3;
 
 pub(crate) fn subdivide(
     tiling: &Tiling,
@@ -17,10 +20,24 @@ pub(crate) fn subdivide(
 ) -> Result<QuadLayout, QuadMatchingError> {
     let (mut regions, faces) = outlines(tiling)?;
     progress.check()?;
-    for _ in 0..parameters.straightening_rounds {
-        straighten(&mut regions, parameters.snap, progress)?;
+    for _ in 0..2 * parameters.straightening_rounds {
+        relax(&mut regions, false, parameters.snap, progress)?;
+        regions = regions.coarsen()?;
     }
-    let Quads { tiled, vertices, edges, quads, quad_of_face } = refine(regions, parameters.snap, progress)?;
+    let Quads { mut tiled, vertices, edges, quads, quad_of_face } =
+        refine(regions, parameters.snap, progress)?;
+    tiled.tile_of_face = quad_of_face;
+    let sides = quads.iter().map(|quad| quad.to_vec()).collect();
+    let mut fine = Regions { tiled, vertices, edges, sides };
+    for _ in 0..RELAXATION_ROUNDS {
+        let changed = relax(&mut fine, true, parameters.snap, progress)?;
+        fine = fine.coarsen()?;
+        if changed == 0 {
+            break;
+        }
+    }
+    let Regions { tiled, vertices, edges, .. } = fine;
+    let quad_of_face = tiled.tile_of_face;
     let region_faces = faces.into_iter().map(halved).collect();
     let (part, _) = tiled.refiner.finish();
     Ok(QuadLayout {

@@ -9,7 +9,8 @@ use crate::spokes::{self, SpokeTask};
 use crate::{MacroEdge, QuadMatchingError, Side};
 use rayon::prelude::*;
 use std::collections::HashSet;
-use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
+use topipe_mesh::refine::Refiner;
+use topipe_mesh::{FaceId, HalfEdgeId, Provenance, VertexId};
 use topipe_progress::Progress;
 
 /// A layout of regions with three or more sides, over the mesh of `tiled`, whose tiles are the regions; faces of no tile
@@ -21,6 +22,49 @@ pub(crate) struct Regions {
     /// Sides of each region, counter-clockwise.
     pub(crate) sides: Vec<Vec<Side>>,
 }
+
+impl Regions {
+    /// Drops the vertices of the mesh that cutting has made and no macro-edge uses any more.
+    pub(crate) fn coarsen(self) -> Result<Self, QuadMatchingError> {
+        let Self { tiled, mut vertices, mut edges, sides } = self;
+        let Tiled { refiner, tile_of_face } = tiled;
+        let mut keep = vec![false; refiner.part().mesh.vertex_count()];
+        let mut constrained = vec![false; 3 * tile_of_face.len()];
+        for edge in &edges {
+            edge.path.iter().for_each(|v| keep[v.index()] = true);
+            for bend in edge.path.windows(3) {
+                keep[bend[1].index()] = !is_straight(&refiner, bend);
+            }
+            for pair in edge.path.windows(2) {
+                if let Some(h) = refiner.half_edge(pair[0], pair[1]) {
+                    constrained[h.index()] = true;
+                    constrained[refiner.twin(h).index()] = true;
+                }
+            }
+        }
+        let coarse = refiner.coarsen(&keep, &constrained, &tile_of_face)?;
+        vertices.iter_mut().for_each(|v| *v = coarse.vertex[v.index()]);
+        for edge in &mut edges {
+            edge.path.iter_mut().for_each(|v| *v = coarse.vertex[v.index()]);
+            edge.path.retain(|v| v.is_some());
+        }
+        let tiled = Tiled { refiner: coarse.refiner, tile_of_face: coarse.labels };
+        Ok(Self { tiled, vertices, edges, sides })
+    }
+}
+
+/// True where a path runs straight on inside a face of the original mesh, so that it can do without the vertex.
+fn is_straight(refiner: &Refiner, bend: &[VertexId]) -> bool {
+    let part = refiner.part();
+    if !matches!(part.provenance[bend[1].index()], Provenance::Face { .. }) {
+        return false;
+    }
+    let [a, b, c] = [bend[0], bend[1], bend[2]].map(|v| part.mesh.position(v));
+    (b - a).cross(c - b).length() <= STRAIGHT * (b - a).dot(c - b)
+}
+
+/// The tangent of the largest bend that is taken for straight.
+const STRAIGHT: f64 = 0.05;
 
 /// A layout of quads.
 pub(crate) struct Quads {

@@ -74,6 +74,13 @@ impl Tiled {
         }
     }
 
+    /// The angle of a tile at one of its vertices: that of its faces there, together.
+    pub(crate) fn corner_angle(&self, vertex: VertexId, tile: u32) -> f64 {
+        let mesh = &self.refiner.part().mesh;
+        let fan = self.refiner.outgoing(vertex);
+        fan.into_iter().filter(|&h| self.tile(h) == tile).map(|h| crate::pairing::face_angle(mesh, h)).sum()
+    }
+
     fn length(&self, h: HalfEdgeId) -> f64 {
         let mesh = &self.refiner.part().mesh;
         mesh.position(self.refiner.origin(h)).distance(mesh.position(self.refiner.target(h)))

@@ -112,6 +112,10 @@ fn sector_angles(share: &[f64]) -> Vec<f64> {
     angles
 }
 
+/// A vertex this near to the centre of the disk is taken for it: a quarter of the radius off is hardly visible in the
+/// layout, and spares slivers.
+const CENTER: f64 = 0.25;
+
 /// Cuts the spokes of a tile into the mesh. Returns the site, and per target the path from the site to it.
 pub(crate) fn cut(
     tiled: &mut Tiled,
@@ -122,7 +126,7 @@ pub(crate) fn cut(
     let mut cutter = Cutter::new(task, map.unwrap_or(DiskMap { places: HashMap::new() }), snap);
     let site = match task.anchor {
         Some(vertex) => vertex,
-        None => cutter.center(tiled, &task.faces),
+        None => cutter.center(tiled, &task.faces, CENTER),
     };
     for path in task.targets.iter().filter_map(|t| t.1.as_ref()) {
         cutter.block(path);
@@ -161,8 +165,12 @@ pub(crate) fn recut(
     if let Some(path) = cutter.straight(tiled, from, to) {
         return path;
     }
-    let mut path = old.to_vec();
-    for (edge, vertex) in cutter.cuts {
+    with_cuts(old.to_vec(), &cutter.cuts)
+}
+
+/// A path with the vertices that have been put on its edges since.
+pub(crate) fn with_cuts(mut path: Vec<VertexId>, cuts: &[([VertexId; 2], VertexId)]) -> Vec<VertexId> {
+    for &(edge, vertex) in cuts {
         if let Some(k) = path.windows(2).position(|w| key(w[0], w[1]) == edge) {
             path.insert(k + 1, vertex);
         }
@@ -170,9 +178,10 @@ pub(crate) fn recut(
     path
 }
 
-struct Cutter {
+/// Cuts paths into the mesh of one tile, straight in its map.
+pub(crate) struct Cutter {
     /// Edges that were cut, in order, and the vertices that cut them.
-    cuts: Vec<([VertexId; 2], VertexId)>,
+    pub(crate) cuts: Vec<([VertexId; 2], VertexId)>,
     map: DiskMap,
     border: HashSet<VertexId>,
     on_spoke: HashSet<VertexId>,
@@ -187,18 +196,22 @@ fn key(a: VertexId, b: VertexId) -> [VertexId; 2] {
 
 impl Cutter {
     fn new(task: &SpokeTask, map: DiskMap, snap: f64) -> Self {
+        Self::within(task.tile, task.border.iter().copied(), map, snap)
+    }
+
+    pub(crate) fn within(tile: u32, border: impl Iterator<Item = VertexId>, map: DiskMap, snap: f64) -> Self {
         Self {
             cuts: Vec::new(),
             map,
-            border: task.border.iter().copied().collect(),
+            border: border.collect(),
             on_spoke: HashSet::new(),
             spoke_edges: BTreeSet::new(),
-            tile: task.tile,
+            tile,
             snap,
         }
     }
 
-    fn block(&mut self, path: &[VertexId]) {
+    pub(crate) fn block(&mut self, path: &[VertexId]) {
         self.on_spoke.extend(path);
         self.spoke_edges.extend(path.windows(2).map(|w| key(w[0], w[1])));
     }
@@ -211,8 +224,8 @@ impl Cutter {
         robust::orient2d(a, b, c)
     }
 
-    /// The vertex nearest to the centre of the disk, or a new one there when none is near.
-    fn center(&mut self, tiled: &mut Tiled, faces: &[FaceId]) -> VertexId {
+    /// The vertex nearest to the centre of the disk, or a new one there when none is within `near` of its radius.
+    pub(crate) fn center(&mut self, tiled: &mut Tiled, faces: &[FaceId], near: f64) -> VertexId {
         let mesh = &tiled.refiner.part().mesh;
         let nearest =
             faces.iter().flat_map(|f| mesh.triangles[f.index()]).filter(|v| !self.border.contains(v)).min_by(
@@ -221,9 +234,8 @@ impl Cutter {
                     d(a).total_cmp(&d(b)).then(a.cmp(&b))
                 },
             );
-        // A quarter of the radius off is hardly visible in the layout, and spares slivers.
         if let Some(vertex) = nearest
-            && self.map.at(vertex).length() < 0.25
+            && self.map.at(vertex).length() < near
         {
             return vertex;
         }
@@ -255,7 +267,12 @@ impl Cutter {
 
     /// Follows the straight segment in the plane, cutting the edges it crosses. `None` when it would cross another
     /// spoke or the border, which needs a degenerate map; what was cut until then stays and does no harm.
-    fn straight(&mut self, tiled: &mut Tiled, site: VertexId, target: VertexId) -> Option<Vec<VertexId>> {
+    pub(crate) fn straight(
+        &mut self,
+        tiled: &mut Tiled,
+        site: VertexId,
+        target: VertexId,
+    ) -> Option<Vec<VertexId>> {
         let mut path = vec![site];
         let mut current = site;
         // Each step crosses one edge; a straight line crosses none twice.

@@ -1,0 +1,352 @@
+//! Relaxation of macro-vertices.
+//!
+//! The regions around a macro-vertex are mapped to a disk, the vertices joined to it at equal angles; the vertex goes to
+//! the centre and its edges are cut anew, straight. On features the vertex stays where it is and the regions of each
+//! sector between two feature edges are mapped to a sector of the disk. Where that makes the angles of the corners worse
+//! the old paths come back: refinement moves no point, so nothing is lost.
+
+use crate::QuadMatchingError;
+use crate::refine::Regions;
+use crate::sides::Tiled;
+use crate::spokes::{self, Cutter};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use topipe_mesh::disk_map::DiskMap;
+use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
+use topipe_progress::Progress;
+
+/// Side `k` of a region, and the corner it starts from.
+type Corner = (usize, usize);
+
+/// Corners this far from a right angle, radians, cost nothing.
+const FREE: f64 = 0.52; // 30 degrees
+/// Corners this far from a right angle are next to the gates of 15 and 165 degrees.
+const STEEP: f64 = 1.13; // 65 degrees
+
+/// What an angle at a corner costs.
+fn cost(angle: f64) -> f64 {
+    let off = (angle - FRAC_PI_2).abs();
+    (off - FREE).max(0.0).powi(2) + 100.0 * (off - STEEP).max(0.0).powi(2)
+}
+
+/// Consecutive corners around a vertex, counter-clockwise.
+struct Fan {
+    corners: Vec<Corner>,
+    /// They go all around; else the first out-side and the last in-side are features.
+    closed: bool,
+}
+
+/// Which corners meet where; relaxation changes none of it.
+struct Incidence {
+    fans: Vec<Vec<Fan>>,
+}
+
+impl Incidence {
+    fn new(regions: &Regions) -> Self {
+        let mut at: Vec<Vec<Corner>> = vec![Vec::new(); regions.vertices.len()];
+        let mut along: HashMap<(u32, bool), Corner> = HashMap::new();
+        for (r, sides) in regions.sides.iter().enumerate() {
+            for (k, side) in sides.iter().enumerate() {
+                at[regions.edges[side.edge as usize].ends[side.reversed as usize] as usize].push((r, k));
+                along.insert((side.edge, side.reversed), (r, k));
+            }
+        }
+        let is_feature = |edge: u32| regions.edges[edge as usize].feature.is_some();
+        let next = |(r, k): Corner| -> Option<Corner> {
+            let sides = &regions.sides[r];
+            let into = sides[(k + sides.len() - 1) % sides.len()];
+            if is_feature(into.edge) { None } else { along.get(&(into.edge, !into.reversed)).copied() }
+        };
+        let fans = at
+            .iter()
+            .map(|corners| {
+                let mut fans = Vec::new();
+                let mut used: HashSet<Corner> = HashSet::new();
+                let starts = |&(r, k): &Corner| is_feature(regions.sides[r][k].edge);
+                let (open, rest): (Vec<Corner>, Vec<Corner>) = corners.iter().copied().partition(starts);
+                for first in open.into_iter().chain(rest) {
+                    if used.contains(&first) {
+                        continue;
+                    }
+                    let mut fan = vec![first];
+                    used.insert(first);
+                    let mut closed = false;
+                    while let Some(corner) = next(fan[fan.len() - 1]) {
+                        if !used.insert(corner) {
+                            closed = corner == first;
+                            break;
+                        }
+                        fan.push(corner);
+                    }
+                    if closed || is_feature(regions.sides[first.0][first.1].edge) {
+                        fans.push(Fan { corners: fan, closed });
+                    }
+                }
+                fans
+            })
+            .collect();
+        Self { fans }
+    }
+}
+
+/// Sweeps over all macro-vertices; with `only_bad` only over those with a corner around them that costs something.
+/// Returns how many were moved or had their edges cut anew.
+pub(crate) fn relax(
+    regions: &mut Regions,
+    only_bad: bool,
+    snap: f64,
+    progress: &Progress,
+) -> Result<usize, QuadMatchingError> {
+    let incidence = Incidence::new(regions);
+    let mut changed = 0;
+    for (v, fans) in incidence.fans.iter().enumerate() {
+        if v % 64 == 0 {
+            progress.check()?;
+            progress.step(v as u64, incidence.fans.len() as u64, "vertices");
+        }
+        for fan in fans.iter().filter(|fan| fan.corners.len() > 1) {
+            changed += relax_one(regions, v, fan, only_bad, snap) as usize;
+        }
+    }
+    Ok(changed)
+}
+
+/// The path along a side of a region in its direction.
+fn path(regions: &Regions, (r, k): Corner) -> Vec<VertexId> {
+    let side = regions.sides[r][k];
+    let mut path = regions.edges[side.edge as usize].path.clone();
+    if side.reversed {
+        path.reverse();
+    }
+    path
+}
+
+/// The cost of all corners of some regions.
+fn total_cost(regions: &Regions, members: &[usize]) -> f64 {
+    members.iter().map(|&r| region_cost(regions, r)).sum()
+}
+
+fn region_cost(regions: &Regions, r: usize) -> f64 {
+    regions.sides[r]
+        .iter()
+        .map(|side| {
+            let v = regions.vertices[regions.edges[side.edge as usize].ends[side.reversed as usize] as usize];
+            cost(regions.tiled.corner_angle(v, r as u32))
+        })
+        .sum()
+}
+
+fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, only_bad: bool, snap: f64) -> bool {
+    let members: Vec<usize> = fan.corners.iter().map(|c| c.0).collect();
+    if members.iter().collect::<HashSet<_>>().len() != members.len() {
+        return false;
+    }
+    let before = total_cost(regions, &members);
+    if only_bad && before <= 0.0 {
+        return false;
+    }
+    let vertex = regions.vertices[v];
+    let n = fan.corners.len();
+    // From the far end of the first out-side around to the far end of the last in-side.
+    let mut ring: Vec<VertexId> = Vec::new();
+    // Where in the ring each region begins, and its first outer half-edge.
+    let mut begins = Vec::with_capacity(n);
+    for &(r, k) in &fan.corners {
+        begins.push(ring.len());
+        let count = regions.sides[r].len();
+        for i in 1..count - 1 {
+            let mut chain = path(regions, (r, (k + i) % count));
+            chain.pop();
+            ring.extend(chain);
+        }
+    }
+    let last_in = |regions: &Regions| {
+        let (r, k) = fan.corners[n - 1];
+        let count = regions.sides[r].len();
+        path(regions, (r, (k + count - 1) % count))
+    };
+    let mut border = ring.clone();
+    let mut ring_end = ring.first().copied();
+    if !fan.closed {
+        let into = last_in(regions);
+        ring_end = into.first().copied();
+        border.extend(&into[..into.len() - 1]);
+        let out = path(regions, fan.corners[0]);
+        border.extend(&out[..out.len() - 1]);
+    }
+    let Some(ring_end) = ring_end else { return false };
+    if border.iter().collect::<HashSet<_>>().len() != border.len() {
+        return false;
+    }
+    // The edges that are cut anew, as out-sides of the corners after them.
+    let spokes: Vec<Corner> = if fan.closed { fan.corners.clone() } else { fan.corners[1..].to_vec() };
+    let targets: Vec<VertexId> = spokes
+        .iter()
+        .map(|&corner| {
+            let path = path(regions, corner);
+            path[path.len() - 1]
+        })
+        .collect();
+    let faces = flood(&regions.tiled, vertex, &members);
+
+    // Equal angles between the edges at the vertex; in between by length.
+    let mesh = &regions.tiled.refiner.part().mesh;
+    let mut fixed: HashMap<VertexId, glam::DVec2> = HashMap::with_capacity(border.len());
+    let sector = if fan.closed { TAU } else { 0.95 * PI };
+    for i in 0..n {
+        let end = if i + 1 < n { begins[i + 1] } else { ring.len() };
+        let stop = if i + 1 < n { ring[begins[i + 1]] } else { ring_end };
+        let chain: Vec<VertexId> = ring[begins[i]..end].iter().copied().chain([stop]).collect();
+        place(&mut fixed, mesh, &chain, |share| {
+            glam::DVec2::from_angle(sector * (i as f64 + share) / n as f64)
+        });
+    }
+    if !fan.closed {
+        let out = path(regions, fan.corners[0]);
+        place(&mut fixed, mesh, &out, |share| glam::DVec2::new(share, 0.0));
+        let into = last_in(regions);
+        place(&mut fixed, mesh, &into, |share| glam::DVec2::from_angle(sector) * (1.0 - share));
+    }
+    let Some(map) = DiskMap::solve(mesh, &faces, &fixed) else { return false };
+    if map.flipped(mesh, &faces) > 0 {
+        return false;
+    }
+
+    let id = members[0] as u32;
+    let labels: Vec<u32> = faces.iter().map(|f| regions.tiled.tile_of_face[f.index()]).collect();
+    let first_new = regions.tiled.tile_of_face.len();
+    let old_paths: Vec<Vec<VertexId>> = spokes.iter().map(|&c| path(regions, c)).collect();
+    for f in &faces {
+        regions.tiled.tile_of_face[f.index()] = id;
+    }
+    let mut cutter = Cutter::within(id, border.iter().copied(), map, snap);
+    let site = if fan.closed { cutter.center(&mut regions.tiled, &faces, CENTER) } else { vertex };
+    let mut paths = Vec::with_capacity(targets.len());
+    for &target in &targets {
+        match cutter.straight(&mut regions.tiled, site, target) {
+            Some(path) => {
+                cutter.block(&path);
+                paths.push(path);
+            }
+            None => break,
+        }
+    }
+    // Pieces of the faces that were cut.
+    let faces: Vec<FaceId> =
+        faces.into_iter().chain((first_new..regions.tiled.tile_of_face.len()).map(FaceId::new)).collect();
+    if paths.len() == targets.len() {
+        set(regions, &spokes, &paths);
+        regions.vertices[v] = site;
+        if fill(regions, &faces, fan, &ring, &begins)
+            && total_cost(regions, &members) <= before + if only_bad { -1e-9 } else { PATIENCE }
+        {
+            return true;
+        }
+    }
+    // Back to the old paths, with the vertices that were put on them.
+    let old_paths: Vec<Vec<VertexId>> =
+        old_paths.into_iter().map(|path| spokes::with_cuts(path, &cutter.cuts)).collect();
+    set(regions, &spokes, &old_paths);
+    regions.vertices[v] = vertex;
+    for f in &faces {
+        regions.tiled.tile_of_face[f.index()] = id;
+    }
+    if !fill(regions, &faces, fan, &ring, &begins) {
+        // Not reached unless an old path was damaged; labels are at least those of the faces as they were.
+        for (f, label) in faces.iter().zip(labels) {
+            regions.tiled.tile_of_face[f.index()] = label;
+        }
+    }
+    false
+}
+
+/// A vertex nearer to the centre of the disk than this is taken for it: 0.1 of the radius turns edges by 6 degrees.
+const CENTER: f64 = 0.1;
+/// What a first relaxation of ragged borders may cost: straight borders are worth it.
+const PATIENCE: f64 = 0.2;
+
+/// Places a chain of vertices but for its last by its length.
+fn place(
+    fixed: &mut HashMap<VertexId, glam::DVec2>,
+    mesh: &topipe_mesh::TriangleMesh,
+    chain: &[VertexId],
+    at: impl Fn(f64) -> glam::DVec2,
+) {
+    let points: Vec<DVec3> = chain.iter().map(|&v| mesh.position(v)).collect();
+    let total: f64 = points.windows(2).map(|w| w[0].distance(w[1])).sum();
+    let mut along = 0.0;
+    for k in 0..chain.len() - 1 {
+        let share = if total > 0.0 { along / total } else { k as f64 / (chain.len() - 1) as f64 };
+        fixed.insert(chain[k], at(share));
+        along += points[k].distance(points[k + 1]);
+    }
+}
+
+/// All faces of the given regions; they hang together around `vertex`.
+fn flood(tiled: &Tiled, vertex: VertexId, members: &[usize]) -> Vec<FaceId> {
+    let inside = |f: FaceId| members.contains(&(tiled.tile_of_face[f.index()] as usize));
+    let mut faces: Vec<FaceId> =
+        tiled.refiner.outgoing(vertex).iter().map(|h| h.face()).filter(|&f| inside(f)).collect();
+    let mut seen: HashSet<FaceId> = faces.iter().copied().collect();
+    let mut next = 0;
+    while next < faces.len() {
+        for k in 0..3 {
+            let beyond = tiled.refiner.twin(HalfEdgeId::of(faces[next], k)).face();
+            if inside(beyond) && seen.insert(beyond) {
+                faces.push(beyond);
+            }
+        }
+        next += 1;
+    }
+    faces.sort_unstable();
+    faces
+}
+
+fn set(regions: &mut Regions, spokes: &[Corner], paths: &[Vec<VertexId>]) {
+    for (&(r, k), path) in spokes.iter().zip(paths) {
+        let side = regions.sides[r][k];
+        let mut path = path.clone();
+        if side.reversed {
+            path.reverse();
+        }
+        regions.edges[side.edge as usize].path = path;
+    }
+}
+
+/// Labels the faces of a star with the regions the paths bound. False when that fails.
+fn fill(regions: &mut Regions, faces: &[FaceId], fan: &Fan, ring: &[VertexId], begins: &[usize]) -> bool {
+    let key = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];
+    let inside: HashSet<FaceId> = faces.iter().copied().collect();
+    let mut blocked: HashSet<[VertexId; 2]> = HashSet::new();
+    for &corner in &fan.corners {
+        blocked.extend(path(regions, corner).windows(2).map(|w| key(w[0], w[1])));
+    }
+    let mut label: BTreeMap<FaceId, u32> = BTreeMap::new();
+    for (i, &(r, k)) in fan.corners.iter().enumerate() {
+        let a = ring[begins[i]];
+        let b = path(regions, (r, (k + 1) % regions.sides[r].len()))[1];
+        let Some(seed) = regions.tiled.refiner.half_edge(a, b) else { return false };
+        let mut stack = vec![seed.face()];
+        if !inside.contains(&seed.face()) || label.insert(seed.face(), r as u32).is_some() {
+            return false;
+        }
+        while let Some(face) = stack.pop() {
+            for side in 0..3 {
+                let h = HalfEdgeId::of(face, side);
+                let beyond = regions.tiled.refiner.twin(h).face();
+                let across = key(regions.tiled.refiner.origin(h), regions.tiled.refiner.target(h));
+                if inside.contains(&beyond) && !blocked.contains(&across) && !label.contains_key(&beyond) {
+                    label.insert(beyond, r as u32);
+                    stack.push(beyond);
+                }
+            }
+        }
+    }
+    let whole = label.len() == faces.len();
+    if whole {
+        for (face, r) in label {
+            regions.tiled.tile_of_face[face.index()] = r;
+        }
+    }
+    whole
+}
