@@ -121,19 +121,26 @@ fn path(regions: &Regions, (r, k): Corner) -> Vec<VertexId> {
     path
 }
 
-/// The cost of all corners of some regions.
-fn total_cost(regions: &Regions, members: &[usize]) -> f64 {
-    members.iter().map(|&r| region_cost(regions, r)).sum()
-}
-
-fn region_cost(regions: &Regions, r: usize) -> f64 {
-    regions.sides[r]
-        .iter()
-        .map(|side| {
-            let v = regions.vertices[regions.edges[side.edge as usize].ends[side.reversed as usize] as usize];
-            cost(regions.tiled.corner_angle(v, r as u32))
-        })
-        .sum()
+/// The cost of the corners that edges from a vertex have to do with: those at the vertex, and at the far ends of the
+/// edges on either hand.
+fn star_cost(regions: &Regions, fan: &Fan) -> f64 {
+    let at = |(r, k): Corner| {
+        let side = regions.sides[r][k];
+        let v = regions.vertices[regions.edges[side.edge as usize].ends[side.reversed as usize] as usize];
+        cost(regions.tiled.corner_angle(v, r as u32))
+    };
+    let mut sum = 0.0;
+    for (i, &(r, k)) in fan.corners.iter().enumerate() {
+        let count = regions.sides[r].len();
+        sum += at((r, k));
+        if fan.closed || i > 0 {
+            sum += at((r, (k + 1) % count));
+        }
+        if fan.closed || i + 1 < fan.corners.len() {
+            sum += at((r, (k + count - 1) % count));
+        }
+    }
+    sum
 }
 
 fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, only_bad: bool, snap: f64) -> bool {
@@ -141,7 +148,7 @@ fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, only_bad: bool, snap: f
     if members.iter().collect::<HashSet<_>>().len() != members.len() {
         return false;
     }
-    let before = total_cost(regions, &members);
+    let before = star_cost(regions, fan);
     if only_bad && before <= 0.0 {
         return false;
     }
@@ -238,7 +245,7 @@ fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, only_bad: bool, snap: f
         set(regions, &spokes, &paths);
         regions.vertices[v] = site;
         if fill(regions, &faces, fan, &ring, &begins)
-            && total_cost(regions, &members) <= before + if only_bad { -1e-9 } else { PATIENCE }
+            && star_cost(regions, fan) <= before + if only_bad { -1e-9 } else { PATIENCE }
         {
             return true;
         }

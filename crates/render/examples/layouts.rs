@@ -33,6 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 camera = Camera::preset(&text).or(angles).ok_or("no such view")?;
             }
             "--size" => tiling_parameters.tile_size = value()?.parse()?,
+            "--cone" => tiling_parameters.normal_cone = value()?.parse()?,
             "--tiles" => tiling_parameters.tiles = value()?.parse()?,
             "--rounds" => parameters.straightening_rounds = value()?.parse()?,
             "--dual" => {
@@ -110,6 +111,36 @@ fn main() -> Result<(), Box<dyn Error>> {
             layout.part.mesh.face_count(),
             problems.iter().take(3).collect::<Vec<_>>()
         );
+        if verbose {
+            let mut on_feature = vec![false; layout.vertices.len()];
+            for edge in layout.edges.iter().filter(|e| e.feature.is_some()) {
+                edge.ends.iter().for_each(|&v| on_feature[v as usize] = true);
+            }
+            let valences = layout.valences();
+            for (q, corners) in angles.iter().enumerate() {
+                for (k, a) in
+                    corners.iter().enumerate().filter(|a| !(15.0..=165.0).contains(&a.1.to_degrees()))
+                {
+                    let v = layout.corners(q)[k];
+                    let fixed = layout.quads[q];
+                    let sector = layout.edges[fixed[k].edge as usize].feature.is_some()
+                        && layout.edges[fixed[(k + 3) % 4].edge as usize].feature.is_some();
+                    println!(
+                        "  quad {q} corner {k} {:.1} at {:.2} {} valence {}",
+                        a.to_degrees(),
+                        layout.part.mesh.position(layout.vertices[v as usize]),
+                        if sector {
+                            "whole sector"
+                        } else if on_feature[v as usize] {
+                            "on feature"
+                        } else {
+                            "inside"
+                        },
+                        valences[v as usize],
+                    );
+                }
+            }
+        }
         if picture {
             draw(&layout, &camera, &options)?.write_png(&folder.join(format!("{stem}.png")))?;
         }

@@ -34,7 +34,8 @@ pub struct Parameters {
     /// Regions of at least the area of a square of this side are faces of their own; over the mean wall thickness.
     /// Bordered tiles only.
     pub least_region: f64,
-    /// Tiles whose normals deviate from their mean by more than this are split, degrees. Bordered tiles only.
+    /// Tiles whose normals deviate from their mean by more than this are split, degrees; the quads of a tile see about
+    /// half of it. Bordered tiles only.
     pub normal_cone: f64,
 }
 
@@ -48,7 +49,7 @@ impl Default for Parameters {
             follow_features: true,
             faces_per_tile: 24,
             least_region: 1.0,
-            normal_cone: 70.0,
+            normal_cone: 100.0,
         }
     }
 }

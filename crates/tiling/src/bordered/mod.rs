@@ -16,6 +16,7 @@ mod barriers;
 mod check;
 mod growth;
 mod pieces;
+mod polygons;
 mod regions;
 mod repair;
 mod sites;

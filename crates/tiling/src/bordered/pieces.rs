@@ -55,7 +55,6 @@ impl Construction<'_> {
                                 self.mark_neighbors(&faces, &mut busy);
                             }
                             Lens::Later => changes += 1,
-                            Lens::Held => held.push(tile),
                         }
                     }
                     Ok(_) => {}
@@ -106,16 +105,19 @@ impl Construction<'_> {
         found
     }
 
-    /// Cuts a tile in two; false where all of it is fixed along segments.
+    /// Cuts a tile in two; false where it is a single face.
     fn bisect(&mut self, tile: u32, faces: &[FaceId]) -> bool {
         let fixed: Vec<FaceId> = faces.iter().copied().filter(|f| self.surface.fixed[f.index()]).collect();
+        // What lies along segments stays together if there is anything else.
+        let all_fixed = fixed.len() == faces.len();
+        let fixed = if all_fixed { Vec::new() } else { fixed };
         let farthest = |found: &BTreeMap<FaceId, (f64, u32)>| {
             // Not reached at all is farthest.
             let distance = |f: &FaceId| found.get(f).map_or(f64::INFINITY, |e| e.0);
             faces
                 .iter()
                 .copied()
-                .filter(|f| !self.surface.fixed[f.index()])
+                .filter(|f| all_fixed || !self.surface.fixed[f.index()])
                 .max_by(|a, b| distance(a).total_cmp(&distance(b)).then(b.cmp(a)))
         };
         let first: Vec<FaceId> = if fixed.is_empty() {
@@ -136,7 +138,7 @@ impl Construction<'_> {
     }
 
     /// Gives the faces of a tile that are nearer to the seeds of piece 1 to a new tile.
-    fn take(&mut self, tile: u32, seeds: &[(u32, FaceId)]) {
+    pub(crate) fn take(&mut self, tile: u32, seeds: &[(u32, FaceId)]) {
         let number = self.seeds.len() as u32;
         self.seeds.push(Seed::Piece);
         for (face, (distance, piece)) in self.within(tile, seeds) {
@@ -164,7 +166,16 @@ impl Construction<'_> {
         let mut open: Vec<usize> = (0..2).filter(|&i| !surface.is_barrier(sides[i][0])).collect();
         open.sort_by(|&i, &j| length(sides[j]).total_cmp(&length(sides[i])).then(i.cmp(&j)));
         let neighbors = [across(sides[0]), across(sides[1])];
-        let Some(&longest) = open.first() else { return Lens::Held };
+        let Some(&longest) = open.first() else {
+            // Segments on both sides: it is cut across, and they get a corner each.
+            let ends = [border[0].face(), border[second].face()];
+            if ends[0] == ends[1] {
+                self.surface.split_face(ends[0]);
+            } else {
+                self.take(tile, &[(0, ends[0]), (1, ends[1])]);
+            }
+            return Lens::Changed;
+        };
         let free = |owner: u32| owner != NONE && busy.get(owner as usize) == Some(&false);
         if neighbors.iter().any(|&n| n != NONE && !free(n)) {
             return Lens::Later;
@@ -196,6 +207,4 @@ enum Lens {
     Changed,
     /// A neighbour was changed in this round; look again in the next.
     Later,
-    /// Both of its sides are segments.
-    Held,
 }

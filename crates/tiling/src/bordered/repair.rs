@@ -6,17 +6,18 @@
 //! no other tile but for new corners, so that it ends; see [`super::pieces`].
 
 use super::check::{Fault, Outline, Stamps, normal_cone, outline};
+use super::surface::NONE;
 use super::{Construction, Seed};
 use crate::TilingError;
 use std::collections::BTreeSet;
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
 
 /// Rounds in which sites are added.
-const SITE_ROUNDS: usize = 12;
+const SITE_ROUNDS: usize = 5;
+/// Rounds in which tiles of many sides are divided.
+const DIVIDE_ROUNDS: usize = 6;
 /// How often segments are halved and everything is begun again.
 const ATTEMPTS: usize = 8;
-/// Most sides of a tile: the corners at its centre are 360 degrees over that.
-const MOST_SIDES: usize = 8;
 
 /// A site that is asked for may lie this many rings of vertices from the place; the tile is refined else.
 const RINGS: usize = 2;
@@ -71,9 +72,6 @@ impl Construction<'_> {
         if angle > self.parameters.normal_cone.to_radians() {
             return Some(Remedy::Site(far(face)));
         }
-        if corners.len() > MOST_SIDES {
-            return farthest(self, faces).map(|face| Remedy::Site(far(face)));
-        }
         None
     }
 
@@ -123,24 +121,37 @@ impl Construction<'_> {
     /// First strips, then sites, then pieces; see the head of this file.
     pub(crate) fn repair(&mut self) -> Result<(), TilingError> {
         let mut left = Vec::new();
+        let mut near = DVec3::ZERO;
         for attempt in 0..ATTEMPTS {
             self.add_sites_where_asked(if attempt == 0 { SITE_ROUNDS } else { 2 })?;
             left = self.cut_to_disks()?;
+            for _ in 0..DIVIDE_ROUNDS {
+                if !left.is_empty() || !self.divide_polygons()? {
+                    break;
+                }
+                left = self.cut_to_disks()?;
+            }
             if left.is_empty() {
                 return Ok(());
             }
             self.progress
                 .remark(&format!("{} tiles are held by their segments, which are halved", left.len()));
-            self.seeds.retain(|seed| *seed != Seed::Piece);
+            let by_tile = self.faces_by_tile();
+            let first = left.first().and_then(|&tile| by_tile[tile as usize].first());
+            near = first.map_or(DVec3::ZERO, |f| self.surface.centroid[f.index()]);
             for &tile in &left {
-                self.halve_segment_of(tile);
+                self.halve_segment_of(&by_tile[tile as usize]);
             }
+            self.seeds.retain(|seed| *seed != Seed::Piece);
             self.lay_strips();
         }
-        let by_tile = self.faces_by_tile();
-        let face = left.first().and_then(|&tile| by_tile[tile as usize].first());
-        let p = face.map_or(DVec3::ZERO, |f| self.surface.centroid[f.index()]);
-        Err(TilingError::NotConverged { violations: left.len(), rounds: ATTEMPTS, x: p.x, y: p.y, z: p.z })
+        Err(TilingError::NotConverged {
+            violations: left.len(),
+            rounds: ATTEMPTS,
+            x: near.x,
+            y: near.y,
+            z: near.z,
+        })
     }
 
     /// Rounds in which violating tiles get sites near what is wrong with them, and tiles are grown anew.
@@ -153,6 +164,7 @@ impl Construction<'_> {
             }
             self.progress.remark(&format!("round {round}: {} tiles to split", violations.len()));
             let mut halved = false;
+            let by_tile = self.faces_by_tile();
             let mut occupied = self.occupied();
             for (tile, remedy) in violations {
                 match remedy {
@@ -161,7 +173,7 @@ impl Construction<'_> {
                             self.add_site(v, &mut occupied);
                         }
                     }
-                    Remedy::Halve => halved |= self.halve_segment_of(tile),
+                    Remedy::Halve => halved |= self.halve_segment_of(&by_tile[tile as usize]),
                 }
             }
             if halved {
@@ -197,20 +209,25 @@ impl Construction<'_> {
         None
     }
 
-    /// Halves the longest segment along a strip; false if there is none.
-    fn halve_segment_of(&mut self, tile: u32) -> bool {
+    /// Halves the longest segment along some faces; false if there is none.
+    fn halve_segment_of(&mut self, faces: &[FaceId]) -> bool {
+        let surface = &self.surface;
+        let mut beside: Vec<usize> = faces
+            .iter()
+            .flat_map(|&f| (0..3).map(move |k| HalfEdgeId::of(f, k)))
+            .map(|h| surface.side[h.index()])
+            .filter(|&side| side != NONE)
+            .map(|side| side as usize / 2)
+            .collect();
+        beside.sort_unstable();
+        beside.dedup();
         let mut longest: Option<(f64, usize)> = None;
-        for (side, &strip) in self.strip_of_side.iter().enumerate() {
-            let Some(segment) = self.segments.get(side / 2) else { continue };
-            if strip == tile {
-                let length: f64 = segment
-                    .path
-                    .windows(2)
-                    .map(|w| self.surface.position(w[0]).distance(self.surface.position(w[1])))
-                    .sum();
-                if longest.is_none_or(|(most, _)| length > most) {
-                    longest = Some((length, side / 2));
-                }
+        for i in beside {
+            let Some(segment) = self.segments.get(i) else { continue };
+            let at = |v: VertexId| surface.position(v);
+            let length: f64 = segment.path.windows(2).map(|w| at(w[0]).distance(at(w[1]))).sum();
+            if longest.is_none_or(|(most, _)| length > most) {
+                longest = Some((length, i));
             }
         }
         let Some((_, segment)) = longest else { return false };
