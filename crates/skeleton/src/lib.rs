@@ -32,6 +32,7 @@ mod non_design;
 mod parameters;
 mod skeleton;
 mod torsion;
+pub mod write;
 
 pub use error::SkeletonError;
 pub use parameters::{Method, Parameters};

@@ -228,10 +228,13 @@ pub struct RenderArguments {
     /// Pixels.
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1200x900")]
     pub size: String,
+    /// Draw this mesh over a skeleton or beams, translucent: a mesh file, or with --pipeline the name of a stage.
+    #[arg(long, value_name = "TARGET")]
+    pub over: Option<String>,
 }
 
 /// Something that can be looked at.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct TargetArguments {
     /// A mesh file, an artifact file, or with --pipeline the name of a stage.
     pub target: String,

@@ -28,6 +28,8 @@ kinds! {
     SplineSurface = "spline surface" v 2: topipe_spline_fit::SplineSurface;
     /// A curve skeleton.
     Skeleton = "skeleton" v 2: topipe_skeleton::Skeleton;
+    /// Beams between shared nodes.
+    Beams = "beam structure" v 1: topipe_beams::Structure;
     /// The figures of a validation.
     Report = "report" v 1: topipe_validation::Report;
 }

@@ -1,5 +1,6 @@
 //! How each kind of artifact is drawn.
 
+use topipe_beams::Structure;
 use topipe_mesh::{Connectivity, DVec3, Part, TriangleMesh};
 use topipe_quad_matching::QuadLayout;
 use topipe_render::{
@@ -14,11 +15,13 @@ use topipe_tiling::Tiling;
 pub(crate) struct View {
     pub(crate) camera: Camera,
     pub(crate) options: Options,
+    /// A mesh that is drawn over a skeleton or beams, so that they shine through.
+    pub(crate) over: Option<Part>,
 }
 
 impl Default for View {
     fn default() -> Self {
-        Self { camera: Camera::ISO, options: Options::default() }
+        Self { camera: Camera::ISO, options: Options::default(), over: None }
     }
 }
 
@@ -84,15 +87,61 @@ pub(crate) fn skeleton(skeleton: &Skeleton, view: &View) -> Result<Image, Render
     scene
         .add_lines(LineLayer {
             polylines: skeleton.edges.iter().map(|&[a, b]| vec![at(a), at(b)]).collect(),
-            coloring: Coloring::Uniform(Color([196, 44, 56])),
+            coloring: Coloring::Uniform(SKELETON),
             width: LineWidth::Tube(radius),
         })
         .add_lines(LineLayer {
             polylines: nodes.map(|point| vec![skeleton.points[point]]).collect(),
-            coloring: Coloring::Uniform(Color([40, 70, 150])),
+            coloring: Coloring::Uniform(NODE),
             width: LineWidth::Tube(2.2 * radius),
         });
+    add_over(&mut scene, view);
     render(&scene, &view.camera, &view.options)
+}
+
+/// Beams as their solid; where none can be built, as tubes.
+pub(crate) fn beams(structure: &Structure, view: &View) -> Result<Image, RenderError> {
+    let positions: Vec<DVec3> = structure.nodes.iter().map(|n| n.position).collect();
+    let line = |beam: &topipe_beams::Beam| structure.line(beam, 16);
+    let mut scene = Scene::default();
+    let mesh = topipe_beams::solid::solid(structure)
+        .map(|solid| topipe_beams::solid::triangulate(&solid.brep, std::f64::consts::TAU / 64.0));
+    match &mesh {
+        Ok(mesh) => {
+            scene.add_mesh(MeshLayer {
+                shading: topipe_render::Shading::Smooth { crease: 25.0 },
+                coloring: Coloring::Uniform(SKELETON),
+                ..MeshLayer::new(mesh)
+            });
+        }
+        Err(_) => {
+            for beam in &structure.beams {
+                scene.add_lines(LineLayer {
+                    polylines: vec![line(beam)],
+                    coloring: Coloring::Uniform(SKELETON),
+                    width: LineWidth::Tube(beam.section.radius()),
+                });
+            }
+        }
+    }
+    let ball = 2.2 * TUBE * extent(&positions);
+    scene.add_lines(LineLayer {
+        polylines: structure.links.iter().map(|l| l.map(|n| structure.position(n)).to_vec()).collect(),
+        coloring: Coloring::Uniform(NODE),
+        width: LineWidth::Tube(ball / 2.2),
+    });
+    add_over(&mut scene, view);
+    render(&scene, &view.camera, &view.options)
+}
+
+const SKELETON: Color = Color([196, 44, 56]);
+const NODE: Color = Color([40, 70, 150]);
+
+fn add_over<'a>(scene: &mut Scene<'a>, view: &'a View) {
+    if let Some(part) = &view.over {
+        let shading = topipe_render::Shading::Smooth { crease: 20.0 };
+        scene.add_mesh(MeshLayer { opacity: 0.35, shading, ..MeshLayer::new(&part.mesh) });
+    }
 }
 
 fn by_id<'a>(mesh: &'a TriangleMesh, ids: &[u32]) -> MeshLayer<'a> {

@@ -1,7 +1,7 @@
 //! `topipe inspect`.
 
 use crate::args::InspectArguments;
-use crate::artifacts::{Mesh, QuadLayout, Report, Skeleton, SplineSurface, Tiling};
+use crate::artifacts::{Beams, Mesh, QuadLayout, Report, Skeleton, SplineSurface, Tiling};
 use crate::display;
 use crate::failure::Failure;
 use std::fmt::Write;
@@ -62,6 +62,13 @@ fn artifact(header: &codec::Header, bytes: &[u8]) -> Result<String, Failure> {
         Skeleton::NAME => {
             let skeleton = decode::<Skeleton>(bytes)?;
             let _ = writeln!(text, "{} points, {} edges", skeleton.points.len(), skeleton.edges.len());
+        }
+        Beams::NAME => {
+            let structure = decode::<Beams>(bytes)?;
+            let _ = writeln!(text, "{} beams, {} nodes", structure.beams.len(), structure.nodes.len());
+            structure.remarks.iter().for_each(|remark| {
+                let _ = writeln!(text, "{remark}");
+            });
         }
         Report::NAME => text += &decode::<Report>(bytes)?.summary(),
         _ => {}

@@ -1,7 +1,7 @@
 //! `topipe render`.
 
-use crate::args::RenderArguments;
-use crate::artifacts::{Mesh, QuadLayout, Skeleton, SplineSurface, Tiling};
+use crate::args::{RenderArguments, TargetArguments};
+use crate::artifacts::{Beams, Mesh, QuadLayout, Skeleton, SplineSurface, Tiling};
 use crate::failure::Failure;
 use crate::picture::{self, View};
 use topipe_engine::cache::write_atomically;
@@ -43,6 +43,7 @@ fn artifact(
         QuadLayout::NAME => picture::layout(&decode::<QuadLayout>(bytes)?, view),
         SplineSurface::NAME => picture::surface(&decode::<SplineSurface>(bytes)?, view),
         Skeleton::NAME => picture::skeleton(&decode::<Skeleton>(bytes)?, view),
+        Beams::NAME => picture::beams(&decode::<Beams>(bytes)?, view),
         other => return Err(Failure::new(ExitCode::Usage, format!("a {other} cannot be drawn"))),
     })
 }
@@ -62,5 +63,26 @@ fn view(arguments: &RenderArguments) -> Result<View, Failure> {
     let (width, height) = size.ok_or_else(|| {
         Failure::new(ExitCode::Usage, format!("`{}` is not a size; use WIDTHxHEIGHT", arguments.size))
     })?;
-    Ok(View { camera, options: Options { width, height, ..Options::default() } })
+    let over = arguments.over.as_ref().map(|target| over(arguments, target)).transpose()?;
+    Ok(View { camera, options: Options { width, height, ..Options::default() }, over })
+}
+
+/// The mesh of `--over`: a file or a stage.
+fn over(arguments: &RenderArguments, target: &str) -> Result<topipe_mesh::Part, Failure> {
+    let target = TargetArguments { target: target.to_owned(), ..arguments.target.clone() };
+    let (path, bytes) = super::target::read(&target)?;
+    match codec::open(&bytes) {
+        Ok((header, _)) if header.kind == Mesh::NAME => codec::decode(&bytes, Mesh::NAME, Mesh::VERSION)
+            .map_err(|error| Failure::new(ExitCode::Storage, error.to_string())),
+        Ok((header, _)) => Err(Failure::new(
+            ExitCode::Usage,
+            format!("--over {}: a mesh is needed, not a {}", target.target, header.kind),
+        )),
+        Err(codec::DecodeError::NotAnArtifact) => {
+            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            topipe_mesh::import::read(&name, &bytes, &Default::default())
+                .map_err(|error| Failure::new(ExitCode::Refused, error.to_string()))
+        }
+        Err(error) => Err(Failure::new(ExitCode::Storage, format!("{}: {error}", path.display()))),
+    }
 }

@@ -1,6 +1,7 @@
 //! The writers: one file per kind of artifact, named like the stage that makes it, and one line each in
 //! [`exporters`].
 
+mod beams;
 mod import;
 mod picture;
 mod quad_matching;
@@ -19,6 +20,7 @@ pub(crate) fn exporters() -> impl Iterator<Item = Exporter> {
         .chain(spline_fit::exporters())
         .chain(quad_matching::exporters())
         .chain(skeleton::exporters())
+        .chain(beams::exporters())
         .chain(validation::exporters())
         .chain(picture::exporters())
 }

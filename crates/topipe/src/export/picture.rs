@@ -1,6 +1,6 @@
 //! Any artifact that has a shape as PNG.
 
-use crate::artifacts::{Mesh, QuadLayout, Skeleton, SplineSurface, Tiling};
+use crate::artifacts::{Beams, Mesh, QuadLayout, Skeleton, SplineSurface, Tiling};
 use crate::picture::{self, View};
 use std::io::Write;
 use topipe_engine::{ExportError, Exporter};
@@ -26,6 +26,9 @@ pub(super) fn exporters() -> Vec<Exporter> {
         ),
         Exporter::new::<Skeleton>("png", version(""), |skeleton, _, file| {
             png(picture::skeleton(skeleton, &View::default()), file)
+        }),
+        Exporter::new::<Beams>("png", version(env!("TOPIPE_WRITER_BEAMS")), |structure, _, file| {
+            png(picture::beams(structure, &View::default()), file)
         }),
     ]
 }

@@ -1,5 +1,6 @@
 //! The kinds of stages. A new one is one file here and one line in [`registry`].
 
+mod beams;
 mod import;
 mod quad_matching;
 mod skeleton;
@@ -19,6 +20,7 @@ pub fn registry() -> Registry {
         .with_stage(quad_matching::QuadMatching)
         .with_stage(spline_fit::SplineFit)
         .with_stage(skeleton::Skeleton)
+        .with_stage(beams::Beams)
         .with_stage(validation::Validation)
         .with_exporters(crate::export::exporters())
 }
@@ -48,12 +50,20 @@ mod tests {
             (Value::Null, "boolean") => "true".into(),
             (Value::Null, "integer") => "7".into(),
             (Value::Null, "number") => "7.5".into(),
+            (Value::Array(_), _) if field.name == "weights" => "[1.0, 1.0, 1.0, 1.0]".into(),
             (Value::Array(_), "list of number") => "[0.375]".into(),
             (Value::Array(_), _) if field.name == "non_design" => {
                 "[{ type = \"box\", min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }]".into()
             }
             (Value::Array(_), _) if field.name == "features" => {
                 "[{ action = \"drop\", space = { type = \"non-design\" } }]".into()
+            }
+            (Value::Array(_), _) if field.name == "profiles" => {
+                "[{ name = \"bar\", shape = \"round\", dimensions = [7.3] }]".into()
+            }
+            (Value::Array(_), _) if field.name == "supports" => "[{ at = [0.0, 0.0, 0.0] }]".into(),
+            (Value::Array(_), _) if field.name == "loads" => {
+                "[{ at = [0.0, 0.0, 0.0], force = [1.0, 0.0, 0.0] }]".into()
             }
             _ => panic!("say here what another value of {field:?} is"),
         }
@@ -86,6 +96,6 @@ mod tests {
         assert!(versions.iter().all(|version| version.len() == 16));
         versions.sort();
         versions.dedup();
-        assert_eq!(versions.len(), 7);
+        assert_eq!(versions.len(), 8);
     }
 }
