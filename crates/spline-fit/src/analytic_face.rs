@@ -69,7 +69,6 @@ impl AnalyticFace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::borders::arc_edge;
     use crate::{PatchSide, SplineSurface};
     use std::f64::consts::PI;
 
@@ -87,7 +86,7 @@ mod tests {
                 ids[k as usize] = surface.edges.len() as u32;
                 let ends = [first + k, first + 1 - k];
                 let at = [p[k as usize], p[1 - k as usize]];
-                surface.edges.push(arc_edge(c, axis, radius, ends, at, PI, 1e-9).unwrap());
+                surface.edges.push(EdgeCurve::arc(c, axis, radius, ends, at, 1e-9));
             }
             ids
         };

@@ -47,6 +47,16 @@ impl Basis {
         Self::clamped(degree, &interior)
     }
 
+    /// The cubic basis with `spans` equal spans (at least one) and double interior knots: curves in it have a
+    /// continuous first derivative, and each span can have any point and slope at its ends.
+    pub fn double(spans: usize) -> Self {
+        let spans = spans.max(1);
+        let mut knots = vec![0.0; 4];
+        knots.extend((1..spans).flat_map(|k| [k as f64 / spans as f64; 2]));
+        knots.extend([1.0; 4]);
+        Self { degree: 3, knots }
+    }
+
     /// Polynomial degree.
     #[inline]
     pub fn degree(&self) -> usize {

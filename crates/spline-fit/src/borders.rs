@@ -11,7 +11,7 @@
 //! cylinders) have a curve on both; validation measures the gap.
 
 mod chains;
-mod crossing;
+pub(crate) mod crossing;
 mod outline;
 mod sharpness;
 mod smoothing_curve;
@@ -222,24 +222,4 @@ pub(crate) fn meet(shapes: &[&RegionShape], start: DVec3) -> DVec3 {
         p += step;
     }
     p
-}
-
-/// The arc between two vertices, counter-clockwise about `axis` through the angle `turn`.
-pub(crate) fn arc_edge(
-    center: DVec3,
-    axis: DVec3,
-    radius: f64,
-    ends: [u32; 2],
-    at: [DVec3; 2],
-    turn: f64,
-    tolerance: f64,
-) -> Option<EdgeCurve> {
-    let (basis, control, shape) = crossing::arc(center, axis, radius, at, turn, tolerance)?;
-    Some(EdgeCurve { ends, basis, control, feature: None, shape })
-}
-
-/// The line between two vertices.
-pub(crate) fn line_edge(ends: [u32; 2], at: [DVec3; 2]) -> Option<EdgeCurve> {
-    let (basis, control, shape) = crossing::line(&at)?;
-    Some(EdgeCurve { ends, basis, control, feature: None, shape })
 }

@@ -1,5 +1,6 @@
 //! Where an edge really runs: on its line or arc if it is one, else on its spline.
 
+use crate::borders::crossing;
 use crate::energy::gauss;
 use crate::hermite::Circle;
 use crate::{CurveShape, EdgeCurve};
@@ -16,6 +17,29 @@ pub struct CurvePoint {
 }
 
 impl EdgeCurve {
+    /// The line between two vertices at the given places.
+    pub fn line(ends: [u32; 2], at: [DVec3; 2]) -> Self {
+        let (basis, control, shape) = crossing::line(&at);
+        Self { ends, basis, control, feature: None, shape }
+    }
+
+    /// The arc between two vertices at the given places, counter-clockwise about the unit vector `axis`, a whole circle
+    /// where both are the same vertex. Its spline stays within `tolerance` (mm) of it.
+    ///
+    /// The places are to lie on the circle.
+    pub fn arc(
+        center: DVec3,
+        axis: DVec3,
+        radius: f64,
+        ends: [u32; 2],
+        at: [DVec3; 2],
+        tolerance: f64,
+    ) -> Self {
+        let turn = turn(center, axis, radius, ends, at);
+        let (basis, control, shape) = crossing::arc(center, axis, radius, at, turn, tolerance);
+        Self { ends, basis, control, feature: None, shape }
+    }
+
     /// The point at `t` of the B-spline.
     pub fn position(&self, t: f64) -> DVec3 {
         self.spline(t).position
@@ -33,12 +57,8 @@ impl EdgeCurve {
     /// other curves.
     pub fn sweep(&self) -> Option<f64> {
         let CurveShape::Arc { center, axis, radius } = self.shape else { return None };
-        if self.ends[0] == self.ends[1] {
-            return Some(TAU);
-        }
-        let circle = Circle::about(center, axis, radius);
-        let turn = circle.angle(self.control[self.control.len() - 1]) - circle.angle(self.control[0]);
-        Some(if turn > 0.0 { turn } else { turn + TAU })
+        let at = [self.control[0], self.control[self.control.len() - 1]];
+        Some(turn(center, axis, radius, self.ends, at))
     }
 
     /// The point at `t` in [0, 1] of the exact shape, which lines and arcs run along evenly.
@@ -82,4 +102,14 @@ impl EdgeCurve {
     pub fn length(&self) -> f64 {
         self.quadrature().into_iter().map(|(t, weight)| weight * self.exact(t).derivative.length()).sum()
     }
+}
+
+/// The angle from the first end to the last, counter-clockwise: positive, a full turn where both are the same.
+fn turn(center: DVec3, axis: DVec3, radius: f64, ends: [u32; 2], at: [DVec3; 2]) -> f64 {
+    if ends[0] == ends[1] {
+        return TAU;
+    }
+    let circle = Circle::about(center, axis, radius);
+    let turn = circle.angle(at[1]) - circle.angle(at[0]);
+    if turn > 0.0 { turn } else { turn + TAU }
 }

@@ -6,10 +6,9 @@
 use crate::Basis;
 use topipe_mesh::DVec3;
 
-/// The basis with `spans` equal spans and double interior knots. `None` for no span at all.
-pub(crate) fn basis(spans: usize) -> Option<Basis> {
-    let interior: Vec<f64> = (1..spans).flat_map(|k| [k as f64 / spans as f64; 2]).collect();
-    if spans == 0 { None } else { Basis::clamped(3, &interior) }
+/// The basis with `spans` equal spans, at least one, and double interior knots.
+pub(crate) fn basis(spans: usize) -> Basis {
+    Basis::double(spans)
 }
 
 /// Control points of the curve through `points` with the given slopes (derivatives by the parameter, which runs from
@@ -107,7 +106,7 @@ mod tests {
             let spans = circle.spans(sweep, tolerance);
             let curve = EdgeCurve {
                 ends: [0, 1],
-                basis: basis(spans).unwrap(),
+                basis: basis(spans),
                 control: circle.control(0.3, sweep, spans),
                 feature: None,
                 shape: CurveShape::Spline,

@@ -3,7 +3,6 @@
 //! The layout divides every border into macro-edges. Between two analytic faces nothing needs the division: pieces of
 //! one line become one line, arcs of one circle one arc, and a circle with no other vertex on it one closed edge.
 
-use crate::borders::{arc_edge, line_edge};
 use crate::{AnalyticFace, CurveShape, EdgeCurve, PatchSide, SplineSurface};
 use topipe_mesh::{DVec3, RegionShape};
 
@@ -198,7 +197,7 @@ fn join(surface: &SplineSurface, chain: &Chain, tolerance: f64) -> Option<EdgeCu
     let end = surface.edges[last.0 as usize].ends[usize::from(!last.1)];
     let at = [start, end].map(|v| surface.vertices[v as usize]);
     let mut whole = match surface.edges[first.0 as usize].shape {
-        CurveShape::Line => line_edge([start, end], at)?,
+        CurveShape::Line => EdgeCurve::line([start, end], at),
         CurveShape::Arc { center, axis, radius } => {
             let axis = if first.1 { -axis } else { axis };
             // Pieces that run the other way would be a cusp: not one arc.
@@ -209,13 +208,8 @@ fn join(surface: &SplineSurface, chain: &Chain, tolerance: f64) -> Option<EdgeCu
             if !pieces().all(|(p, against)| along(p, against)) {
                 return None;
             }
-            let turn = if chain.closed {
-                std::f64::consts::TAU
-            } else {
-                pieces().filter_map(|(p, _)| p.sweep()).sum()
-            };
             let at: [DVec3; 2] = if chain.closed { [at[0], at[0]] } else { at };
-            arc_edge(center, axis, radius, [start, end], at, turn, tolerance)?
+            EdgeCurve::arc(center, axis, radius, [start, end], at, tolerance)
         }
         CurveShape::Spline => return None,
     };

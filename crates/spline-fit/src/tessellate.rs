@@ -61,19 +61,30 @@ impl SplineSurface {
     /// The same, with no edge inside an analytic face longer than `longest` (mm), and the face of each triangle:
     /// patches first, then analytic faces.
     pub fn tessellate_with(&self, chord_tolerance: f64, longest: f64) -> (TriangleMesh, Vec<u32>) {
+        self.refined(chord_tolerance, longest, true)
+    }
+
+    /// The triangles of the analytic faces alone, and the analytic face of each.
+    pub fn tessellate_faces(&self, chord_tolerance: f64, longest: f64) -> (TriangleMesh, Vec<u32>) {
+        let (mesh, mut faces) = self.refined(chord_tolerance, longest, false);
+        faces.iter_mut().for_each(|face| *face -= self.patches.len() as u32);
+        (mesh, faces)
+    }
+
+    fn refined(&self, chord_tolerance: f64, longest: f64, patches: bool) -> (TriangleMesh, Vec<u32>) {
         let mut tolerance = if chord_tolerance > 0.0 { chord_tolerance } else { f64::MIN_POSITIVE };
         for _ in 0..REFINEMENTS {
-            let (mesh, face_of_triangle, complete) = self.triangles(tolerance, longest);
+            let (mesh, face_of_triangle, complete) = self.triangles(tolerance, longest, patches);
             if complete {
                 return (mesh, face_of_triangle);
             }
             tolerance /= 4.0;
         }
-        let (mesh, face_of_triangle, _) = self.triangles(tolerance, longest);
+        let (mesh, face_of_triangle, _) = self.triangles(tolerance, longest, patches);
         (mesh, face_of_triangle)
     }
 
-    fn triangles(&self, tolerance: f64, longest: f64) -> (TriangleMesh, Vec<u32>, bool) {
+    fn triangles(&self, tolerance: f64, longest: f64, patches: bool) -> (TriangleMesh, Vec<u32>, bool) {
         let mut mesh = TriangleMesh { positions: self.vertices.clone(), triangles: Vec::new() };
         // Points along each edge, ends included, as mesh vertices.
         let edges: Vec<Vec<VertexId>> = self
@@ -98,7 +109,7 @@ impl SplineSurface {
             points
         };
         let mut face_of_triangle = Vec::new();
-        for (p, patch) in self.patches.iter().enumerate() {
+        for (p, patch) in self.patches.iter().enumerate().filter(|_| patches) {
             let sides: Vec<Vec<VertexId>> = patch.sides.iter().map(along).collect();
             add_patch(&mut mesh, patch, &sides, tolerance);
             face_of_triangle.resize(mesh.triangles.len(), p as u32);

@@ -3,7 +3,7 @@
 use crate::{LayoutFigures, ValidationError, topology};
 use std::collections::BTreeMap;
 use topipe_mesh::DVec3;
-use topipe_quad_matching::QuadLayout;
+use topipe_quad_matching::{QuadLayout, Side};
 
 fn check(layout: &QuadLayout) -> Result<(), ValidationError> {
     topology::check(&layout.part, "layout")?;
@@ -27,6 +27,10 @@ fn check(layout: &QuadLayout) -> Result<(), ValidationError> {
         .position(|sides| sides.iter().any(|side| side.edge as usize >= layout.edges.len()))
     {
         return refuse(format!("quad {quad} names an edge that does not exist"));
+    }
+    let loops = layout.region_faces.iter().flat_map(|face| &face.loops).flatten();
+    if loops.clone().any(|side| side.edge as usize >= layout.edges.len()) {
+        return refuse("a region face names an edge that does not exist".to_owned());
     }
     if layout.quad_of_face.len() != layout.part.mesh.face_count() {
         return refuse("it has not one quad per face of its mesh".to_owned());
@@ -57,11 +61,13 @@ fn corner(layout: &QuadLayout, vertex: u32) -> DVec3 {
     layout.part.mesh.position(layout.vertices[vertex as usize])
 }
 
-/// `None` unless each edge has two sides in opposite directions and the sides of each quad form a loop.
+/// `None` unless each edge has two sides in opposite directions and the sides of each quad and region face form loops.
 fn genus(layout: &QuadLayout) -> Option<i64> {
-    let sides = layout.quads.iter().map(|quad| quad.map(|side| (side.edge, side.reversed)));
+    let along = |sides: &[Side]| sides.iter().map(|side| (side.edge, side.reversed)).collect::<Vec<_>>();
+    let quads = layout.quads.iter().map(|quad| vec![along(quad)]);
+    let faces = layout.region_faces.iter().map(|face| face.loops.iter().map(|l| along(l)).collect());
     let ends: Vec<[u32; 2]> = layout.edges.iter().map(|edge| edge.ends).collect();
-    crate::surface::quad_complex(layout.vertices.len(), &ends, sides).genus
+    crate::surface::count_complex(layout.vertices.len(), &ends, quads.chain(faces)).genus
 }
 
 /// The largest sum of the angles of a quad's faces at one of its corners, degrees.

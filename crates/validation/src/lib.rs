@@ -46,8 +46,8 @@ pub use error::ValidationError;
 pub use parameters::Parameters;
 pub use report::{
     DeviationFigures, DihedralFigures, FeatureFigures, FlatFace, Hole, KinkFigures, LayoutFigures,
-    NormalJump, OriginalFigures, RepairFigures, Report, ShapeFigures, SkeletonFigures, SmoothingFigures,
-    SurfaceFigures,
+    NormalJump, OriginalFigures, RepairFigures, Report, RoundFace, ShapeFigures, SkeletonFigures,
+    SmoothingFigures, SurfaceFigures,
 };
 pub use skeleton::{BranchPoint, bounding_sphere, off_center};
 pub use surface::volume_by_quadrature;

@@ -242,20 +242,51 @@ pub struct SurfaceFigures {
     pub volume_mm3: f64,
     /// Volume over that of the smoothed mesh, minus 1.
     pub volume_error: f64,
+    /// What cylinders add to the volume between the facets of their walls in the mesh: negative for holes. It belongs
+    /// to the part, and not to the mesh.
+    pub rounding_mm3: f64,
+    /// The error of the volume without that.
+    pub volume_error_without_rounding: f64,
     /// Against the smoothed mesh.
     pub deviation: Option<DeviationFigures>,
     /// Against the original.
     pub deviation_original: Option<DeviationFigures>,
-    /// Over edges that are not features; `null` without such edges.
+    /// Over edges of patches that are not features; `null` without such edges.
     pub normal_jump_deg: Option<NormalJump>,
     /// Feature edges by kind.
     pub features: Vec<FeatureFigures>,
-    /// Largest distance between the two patches at an edge; exactly 0 where they share their control points.
+    /// Largest distance between the two faces at an edge, from the one surface to the other; exactly 0 where patches
+    /// share their control points.
     pub gap_mm: f64,
     /// Faces that are planes.
     pub planes: usize,
     /// Faces that are cylinders.
     pub cylinders: usize,
+    /// Largest distance of the border of a plane from the plane; `null` without planes.
+    pub flatness_mm: Option<f64>,
+    /// The cylinders.
+    pub round_faces: Vec<RoundFace>,
+}
+
+/// A face of the surface that is a cylinder.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RoundFace {
+    /// A hole, not a boss.
+    pub hole: bool,
+    /// It goes once around its axis.
+    pub all_around: bool,
+    /// Unit direction of the axis; its largest component is positive.
+    pub axis: [f64; 3],
+    /// A point of the axis near the middle of the face.
+    pub point: [f64; 3],
+    /// Exact.
+    pub diameter_mm: f64,
+    /// Of the cylinder fitted to its wall in the smoothed mesh; `null` where the wall is not found there.
+    pub diameter_mesh_mm: Option<f64>,
+    /// Its area.
+    pub area_mm2: f64,
+    /// What it adds to the volume between the facets of its wall in the mesh: negative for a hole.
+    pub rounding_mm3: f64,
 }
 
 /// The skeleton.

@@ -139,6 +139,27 @@ impl Report {
                 figure(s.volume_error),
                 figure(s.gap_mm)
             )?;
+            if s.planes + s.cylinders > 0 {
+                let flatness =
+                    s.flatness_mm.map_or_else(String::new, |f| format!(" flat to {} mm", figure(f)));
+                writeln!(
+                    text,
+                    "           {} planes{flatness}, {} cylinders; volume error {} without the {} mm3 between facets and cylinders",
+                    s.planes,
+                    s.cylinders,
+                    figure(s.volume_error_without_rounding),
+                    figure(s.rounding_mm3)
+                )?;
+            }
+            for hole in s.round_faces.iter().filter(|face| face.hole) {
+                let [x, y, z] = hole.point.map(figure);
+                let mesh = hole.diameter_mesh_mm.map_or_else(|| "?".to_owned(), |d| format!("{d:.6}"));
+                writeln!(
+                    text,
+                    "           hole at ({x}, {y}, {z}): diameter {:.6} mm, {mesh} mm in the mesh",
+                    hole.diameter_mm
+                )?;
+            }
             if let Some(d) = &s.deviation {
                 writeln!(text, "           from the smoothed mesh: {}", deviation(d))?;
             }

@@ -14,7 +14,7 @@ const SMALLEST_ANGLE: f64 = 1e-3;
 pub(super) fn curve(a: &RegionShape, b: &RegionShape, path: &[DVec3], tolerance: f64) -> Option<Curve> {
     let curve = match (*a, *b) {
         (RegionShape::Plane { normal: n, .. }, RegionShape::Plane { normal: m, .. }) => {
-            (n.cross(m).length() > SMALLEST_ANGLE).then(|| line(path)).flatten()
+            (n.cross(m).length() > SMALLEST_ANGLE).then(|| line(path))
         }
         (RegionShape::Plane { point, normal }, RegionShape::Cylinder { point: on, axis, radius, .. })
         | (RegionShape::Cylinder { point: on, axis, radius, .. }, RegionShape::Plane { point, normal }) => {
@@ -38,9 +38,9 @@ fn distance((basis, control, _): &Curve, p: DVec3) -> f64 {
 }
 
 /// The segment between the ends of `path`.
-pub(crate) fn line(path: &[DVec3]) -> Option<Curve> {
+pub(crate) fn line(path: &[DVec3]) -> Curve {
     let (a, b) = (path[0], path[path.len() - 1]);
-    Some((hermite::basis(1)?, hermite::control(&[a, b], &[b - a, b - a]), CurveShape::Line))
+    (hermite::basis(1), hermite::control(&[a, b], &[b - a, b - a]), CurveShape::Line)
 }
 
 /// The angle through which `path` turns about the circle's axis.
@@ -64,13 +64,13 @@ fn plane_and_cylinder(
     let tilt = normal.cross(axis).length();
     if along.abs() < SMALLEST_ANGLE {
         // Parallel to the axis: rulings, if any.
-        return line(path);
+        return Some(line(path));
     }
     if tilt * radius <= tolerance {
         let center = on + axis * (normal.dot(point - on) / along);
         let turn = sweep(&Circle::about(center, normal, radius), path);
         let axis = if turn < 0.0 { -normal } else { normal };
-        return arc(center, axis, radius, ends, turn.abs(), tolerance);
+        return Some(arc(center, axis, radius, ends, turn.abs(), tolerance));
     }
     // An ellipse is the circle across the axis, moved along the axis into the plane. Moving control points moves the
     // curve, and leaves its distance from the axis as it is.
@@ -82,7 +82,7 @@ fn plane_and_cylinder(
         *p += axis * (normal.dot(point - *p) / along);
     }
     pin(&mut control, ends);
-    Some((hermite::basis(spans)?, control, CurveShape::Spline))
+    Some((hermite::basis(spans), control, CurveShape::Spline))
 }
 
 /// The arc from the first end, counter-clockwise about `axis` through the angle `turn`.
@@ -93,12 +93,12 @@ pub(crate) fn arc(
     ends: [DVec3; 2],
     turn: f64,
     tolerance: f64,
-) -> Option<Curve> {
+) -> Curve {
     let circle = Circle::about(center, axis, radius);
     let spans = circle.spans(turn, tolerance);
     let mut control = circle.control(circle.angle(ends[0]), turn, spans);
     pin(&mut control, ends);
-    Some((hermite::basis(spans)?, control, CurveShape::Arc { center, axis, radius }))
+    (hermite::basis(spans), control, CurveShape::Arc { center, axis, radius })
 }
 
 /// The first and last control points are the vertices, bit for bit; they were so up to rounding.
@@ -120,7 +120,7 @@ fn general(a: &RegionShape, b: &RegionShape, path: &[DVec3], tolerance: f64) -> 
     };
     let mut spans = 1;
     while spans <= MOST_SPANS {
-        let basis = hermite::basis(spans)?;
+        let basis = hermite::basis(spans);
         let mut places: Vec<f64> = (0..=spans).map(|k| k as f64 / spans as f64).collect();
         let mut control = Vec::new();
         for _ in 0..6 {

@@ -241,7 +241,7 @@ fn plane_piece(development: &Development, curve: &Curve, range: [f64; 2]) -> Opt
         points.push(development.position(q));
         slopes.push(development.lift(q, slope * length));
     }
-    Some((hermite::basis(spans)?, hermite::control(&points, &slopes)))
+    Some((hermite::basis(spans), hermite::control(&points, &slopes)))
 }
 
 /// A piece that goes around the axis, never steeper than this slope.
@@ -293,7 +293,7 @@ fn around_piece(
             slopes.push(DVec3::Z * (slope.y / slope.x * (to - from)));
         }
         let heights = hermite::control(&heights, &slopes);
-        let basis = hermite::basis(spans)?;
+        let basis = hermite::basis(spans);
         let height = |t: f64| {
             let local = basis.evaluate(t);
             (0..local.count).map(|k| local.derivatives[0][k] * heights[local.first + k].z).sum::<f64>()
@@ -330,7 +330,7 @@ fn cylinder_piece(
             points.push(development.position(q));
             slopes.push(development.lift(q, slope * length));
         }
-        let (basis, control) = (hermite::basis(spans)?, hermite::control(&points, &slopes));
+        let (basis, control) = (hermite::basis(spans), hermite::control(&points, &slopes));
         let far = (0..4 * spans)
             .map(|k| {
                 let local = basis.evaluate((k as f64 + 0.5) / (4 * spans) as f64);

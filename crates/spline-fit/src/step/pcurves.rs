@@ -78,7 +78,7 @@ fn parameters(edge: &EdgeCurve, frame: &Frame, inside: f64) -> Option<(crate::Ba
         let here = values[(inside * spans as f64).round() as usize].x;
         let shift = turn(at(inside).0.x - here);
         values.iter_mut().for_each(|v| v.x += shift);
-        let basis = hermite::basis(spans)?;
+        let basis = hermite::basis(spans);
         let control = hermite::control(&values, &slopes);
         let far = (0..4 * spans)
             .map(|k| {

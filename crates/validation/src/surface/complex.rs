@@ -1,21 +1,20 @@
-//! Counting on vertices, edges and quadrilaterals, for layouts and surfaces alike.
+//! Counting on vertices, edges and faces, for layouts and surfaces alike.
 
 /// What counting says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Complex {
-    /// Each edge has two sides in opposite directions, and the sides of each quad form a loop.
+    /// Each edge has two sides in opposite directions, and the sides of each face form loops.
     pub(crate) closed: bool,
-    /// `components - (V - E + F) / 2` over the vertices and edges in use, where closed.
+    /// `components - (V - E + sum of 2 - loops) / 2` over the vertices and edges in use, where closed: a face with
+    /// `n` loops is a sphere with `n` holes.
     pub(crate) genus: Option<i64>,
 }
 
-/// `sides` gives, for each quad, its edges in order and whether it runs along them backwards. All indices must be in
-/// range.
-pub(crate) fn quad_complex(
-    vertices: usize,
-    ends: &[[u32; 2]],
-    sides: impl Iterator<Item = [(u32, bool); 4]>,
-) -> Complex {
+/// The sides around a quad or along one loop of a face: edges, and whether they are run backwards.
+type Loop = Vec<(u32, bool)>;
+
+/// `faces` gives the loops of each face. All indices must be in range.
+pub(crate) fn count(vertices: usize, ends: &[[u32; 2]], faces: impl Iterator<Item = Vec<Loop>>) -> Complex {
     let mut uses = vec![[0u32; 2]; ends.len()];
     let mut parent: Vec<u32> = (0..vertices as u32).collect();
     fn root(parent: &mut [u32], mut v: u32) -> u32 {
@@ -26,26 +25,34 @@ pub(crate) fn quad_complex(
         v
     }
     let mut used = vec![false; vertices];
-    let (mut quads, mut loops) = (0i64, true);
-    for quad in sides {
-        quads += 1;
-        for k in 0..4 {
-            let ((edge, reversed), (next, next_reversed)) = (quad[k], quad[(k + 1) % 4]);
-            uses[edge as usize][usize::from(reversed)] += 1;
-            let (start, end) =
-                (ends[edge as usize][usize::from(reversed)], ends[edge as usize][usize::from(!reversed)]);
-            loops &= end == ends[next as usize][usize::from(next_reversed)];
-            used[start as usize] = true;
-            used[end as usize] = true;
-            let (a, b) = (root(&mut parent, start), root(&mut parent, end));
-            parent[a.max(b) as usize] = a.min(b);
+    let (mut all, mut interiors, mut loops) = (0i64, 0i64, true);
+    for face in faces {
+        all += 1;
+        interiors += 2 - face.len() as i64;
+        // All loops of a face belong to one component.
+        let first =
+            face.first().and_then(|sides| sides.first()).map(|&(e, r)| ends[e as usize][usize::from(r)]);
+        for sides in &face {
+            for (k, &(edge, reversed)) in sides.iter().enumerate() {
+                let (next, next_reversed) = sides[(k + 1) % sides.len()];
+                uses[edge as usize][usize::from(reversed)] += 1;
+                let (start, end) =
+                    (ends[edge as usize][usize::from(reversed)], ends[edge as usize][usize::from(!reversed)]);
+                loops &= end == ends[next as usize][usize::from(next_reversed)];
+                used[start as usize] = true;
+                used[end as usize] = true;
+                for v in [Some(end), first].into_iter().flatten() {
+                    let (a, b) = (root(&mut parent, start), root(&mut parent, v));
+                    parent[a.max(b) as usize] = a.min(b);
+                }
+            }
         }
     }
     // An edge without a side is not a border: it is not there at all.
     let in_use = uses.iter().filter(|u| **u != [0, 0]);
-    let closed = quads > 0 && loops && in_use.clone().all(|u| *u == [1, 1]);
+    let closed = all > 0 && loops && in_use.clone().all(|u| *u == [1, 1]);
     let components = (0..vertices).filter(|&v| used[v] && parent[v] == v as u32).count() as i64;
-    let euler = used.iter().filter(|&&u| u).count() as i64 - in_use.count() as i64 + quads;
+    let euler = used.iter().filter(|&&u| u).count() as i64 - in_use.count() as i64 + interiors;
     Complex { closed, genus: closed.then_some(components - euler / 2) }
 }
 
@@ -54,6 +61,10 @@ mod tests {
     use super::*;
 
     type Sides = [(u32, bool); 4];
+
+    fn quad_complex(vertices: usize, ends: &[[u32; 2]], quads: impl Iterator<Item = Sides>) -> Complex {
+        count(vertices, ends, quads.map(|sides| vec![sides.to_vec()]))
+    }
 
     /// A torus of `m` x `n` quads: edges 2 k (along) and 2 k + 1 (across) start at vertex k.
     fn torus(m: usize, n: usize) -> (Vec<[u32; 2]>, Vec<Sides>) {
@@ -92,5 +103,17 @@ mod tests {
         turned[4][2].1 = false;
         assert!(!quad_complex(9, &ends, turned.into_iter()).closed);
         assert!(!quad_complex(0, &[], std::iter::empty()).closed);
+    }
+
+    #[test]
+    fn faces_with_several_loops_count_as_spheres_with_holes() {
+        // A tube: four circles, each one closed edge; two walls and two rings, each with two loops.
+        let ends: Vec<[u32; 2]> = (0..4).map(|v| [v, v]).collect();
+        let face = |a: u32, b: u32| vec![vec![(a, false)], vec![(b, true)]];
+        let tube = [face(0, 1), face(1, 2), face(2, 3), face(3, 0)];
+        assert_eq!(count(4, &ends, tube.into_iter()), Complex { closed: true, genus: Some(1) });
+        // A solid cylinder: a wall and two disks.
+        let solid = [face(0, 1), vec![vec![(1, false)]], vec![vec![(0, true)]]];
+        assert_eq!(count(2, &ends[..2], solid.into_iter()), Complex { closed: true, genus: Some(0) });
     }
 }

@@ -1,16 +1,17 @@
-//! Normals and gaps along the edges that two patches share, from both patches.
+//! Normals and gaps along the edges that two faces share, from both of them.
 
 use crate::NormalJump;
 use rayon::prelude::*;
-use topipe_mesh::DVec3;
+use topipe_mesh::{DVec3, RegionShape};
 use topipe_spline_fit::{EdgeCurve, Patch, SplineSurface};
 
-/// One patch at an edge: which, with which of its sides, and whether it runs against the edge.
+/// One face at an edge.
 #[derive(Debug, Clone, Copy)]
-struct Use {
-    patch: u32,
-    side: usize,
-    reversed: bool,
+enum Use {
+    /// A patch, with which of its sides, and whether it runs against the edge.
+    Patch { patch: u32, side: usize, reversed: bool },
+    /// A face of known shape.
+    Shape(RegionShape),
 }
 
 /// What one edge has to say.
@@ -26,12 +27,19 @@ pub(super) fn angle(a: DVec3, b: DVec3) -> f64 {
     a.cross(b).length().atan2(a.dot(b))
 }
 
-/// Normal jumps over edges that are not features, and the largest gap over all edges.
+/// Normal jumps over edges of patches that are not features, and the largest gap over all edges.
+///
+/// The angle between two faces of known shape is given with the shapes: it is not counted as a jump.
 pub(super) fn along_edges(surface: &SplineSurface, points: u32) -> (Option<NormalJump>, f64) {
     let mut uses = vec![Vec::new(); surface.edges.len()];
     for (patch, p) in surface.patches.iter().enumerate() {
         for (side, s) in p.sides.iter().enumerate() {
-            uses[s.edge as usize].push(Use { patch: patch as u32, side, reversed: s.reversed });
+            uses[s.edge as usize].push(Use::Patch { patch: patch as u32, side, reversed: s.reversed });
+        }
+    }
+    for face in &surface.faces {
+        for side in face.loops.iter().flatten() {
+            uses[side.edge as usize].push(Use::Shape(face.shape));
         }
     }
     let results: Vec<EdgeResult> = surface
@@ -61,26 +69,42 @@ pub(super) fn along_edges(surface: &SplineSurface, points: u32) -> (Option<Norma
     (jump, gap)
 }
 
+/// A face at the point `t` of an edge: the point of the face there, and its normal.
+fn at(surface: &SplineSurface, edge: &EdgeCurve, u: Use, t: f64) -> (DVec3, DVec3) {
+    match u {
+        Use::Patch { patch, side, reversed } => {
+            let (x, y) = Patch::side_parameters(side, if reversed { 1.0 - t } else { t });
+            let s = surface.patches[patch as usize].evaluate(x, y);
+            (s.position, s.normal())
+        }
+        Use::Shape(shape) => {
+            let p = edge.exact(t).position;
+            (shape.project(p), shape.normal(p))
+        }
+    }
+}
+
 fn compare(surface: &SplineSurface, edge: &EdgeCurve, a: Use, b: Use, points: u32) -> EdgeResult {
     let mut result = EdgeResult::default();
-    let shared = [a, b].iter().all(|u| shares_controls(&surface.patches[u.patch as usize], edge, *u));
+    let shared = [a, b].iter().all(|u| shares_controls(surface, edge, *u));
     for k in 0..points {
         let t = (f64::from(k) + 0.5) / f64::from(points);
-        let at = |u: Use| {
-            let along = if u.reversed { 1.0 - t } else { t };
-            let (x, y) = Patch::side_parameters(u.side, along);
-            surface.patches[u.patch as usize].evaluate(x, y)
+        let ((p, n), (q, m)) = (at(surface, edge, a, t), at(surface, edge, b, t));
+        let gap = match (a, b) {
+            (Use::Patch { .. }, Use::Patch { .. }) if shared => 0.0,
+            (Use::Patch { .. }, Use::Patch { .. }) => p.distance(q),
+            // Of a shape the nearest point counts, not the one with the same parameter.
+            (Use::Patch { .. }, Use::Shape(shape)) => shape.distance(p).abs(),
+            (Use::Shape(shape), Use::Patch { .. }) => shape.distance(q).abs(),
+            (Use::Shape(_), Use::Shape(_)) => p.distance(q),
         };
-        let (p, q) = (at(a), at(b));
-        if !shared {
-            result.gap = result.gap.max(p.position.distance(q.position));
-        }
-        if edge.feature.is_none() {
-            let (n, m) = (p.normal(), q.normal());
+        result.gap = result.gap.max(gap);
+        let between_shapes = matches!((a, b), (Use::Shape(_), Use::Shape(_)));
+        if edge.feature.is_none() && !between_shapes {
             if n == DVec3::ZERO || m == DVec3::ZERO {
                 result.singular += 1;
             } else {
-                result.jumps.push((angle(n, m).to_degrees(), p.position));
+                result.jumps.push((angle(n, m).to_degrees(), p));
             }
         }
     }
@@ -89,16 +113,18 @@ fn compare(surface: &SplineSurface, edge: &EdgeCurve, a: Use, b: Use, points: u3
 
 /// Whether the border row of the patch and its knots are those of the curve, bit for bit: then both sides are the
 /// same curve, and a difference of their values would be rounding.
-fn shares_controls(patch: &Patch, edge: &EdgeCurve, u: Use) -> bool {
+fn shares_controls(surface: &SplineSurface, edge: &EdgeCurve, u: Use) -> bool {
+    let Use::Patch { patch, side, reversed } = u else { return false };
+    let patch = &surface.patches[patch as usize];
     let (width, height) = (patch.basis_u.len(), patch.basis_v.len());
-    let (basis, row): (_, Vec<usize>) = match u.side {
+    let (basis, row): (_, Vec<usize>) = match side {
         0 => (&patch.basis_u, (0..width).collect()),
         1 => (&patch.basis_v, (0..height).map(|j| width - 1 + j * width).collect()),
         2 => (&patch.basis_u, (0..width).rev().map(|i| i + (height - 1) * width).collect()),
         _ => (&patch.basis_v, (0..height).rev().map(|j| j * width).collect()),
     };
     // Sides 2 and 3 run against the parameter; a reversed side runs against the curve.
-    let mirrored = (u.side >= 2) != u.reversed;
+    let mirrored = (side >= 2) != reversed;
     let same_knots = if mirrored {
         let mirror: Vec<f64> = edge.basis.knots().iter().rev().map(|k| 1.0 - k).collect();
         // 1 - k is not exact for every k: a knot may differ in its last bit.
@@ -108,7 +134,7 @@ fn shares_controls(patch: &Patch, edge: &EdgeCurve, u: Use) -> bool {
         edge.basis.knots() == basis.knots()
     };
     let bits = |p: DVec3| p.to_array().map(f64::to_bits);
-    let along = |k: usize| if u.reversed { row.len() - 1 - k } else { k };
+    let along = |k: usize| if reversed { row.len() - 1 - k } else { k };
     same_knots
         && edge.basis.degree() == basis.degree()
         && row.len() == edge.control.len()

@@ -3,7 +3,7 @@
 use crate::deviation::Surface;
 use rayon::prelude::*;
 use topipe_mesh::spatial::NearestPoint;
-use topipe_mesh::{DVec3, TriangleMesh, VertexId};
+use topipe_mesh::{DVec3, RegionShape, TriangleMesh, VertexId};
 use topipe_spline_fit::{Patch, SplineSurface};
 
 /// Cells along a side of a patch.
@@ -11,6 +11,9 @@ const CELLS: std::ops::RangeInclusive<usize> = 4..=128;
 /// Steps of Gauss-Newton towards a foot point. Three bring the error below 1e-9 of a cell on the bracket; a step that
 /// does not improve ends the search earlier.
 const STEPS: usize = 4;
+
+/// Distance of the triangulation of a cylinder from it, over the spacing: it only finds where to look.
+const CHORD: f64 = 0.02;
 
 /// The points of one patch.
 struct Grid {
@@ -40,9 +43,27 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
             }
         }
     }
+    let in_patches = patch_of_face.len();
+    let (faces, face_of_triangle) = surface.tessellate_faces(spacing * CHORD, spacing);
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(&faces.positions);
+    mesh.triangles.extend(faces.triangles.iter().map(|t| t.map(|v| VertexId(v.0 + first))));
+    // As of a mesh: exact for quadratic functions on a triangle, at points of the face itself.
+    for (f, &face) in faces.faces().zip(&face_of_triangle) {
+        let area = faces.area_vector(f).length() / 2.0;
+        let shape = &surface.faces[face as usize].shape;
+        for p in faces.corners(f) {
+            samples.push((p, area / 12.0));
+        }
+        samples.push((shape.project(faces.centroid(f)), 0.75 * area));
+    }
     let triangulation = mesh.clone();
     let refine = move |p: DVec3, nearest: &NearestPoint| {
         let face = nearest.face.index();
+        if face >= in_patches {
+            let shape = &surface.faces[face_of_triangle[face - in_patches] as usize].shape;
+            return to_shape(shape, p, triangulation.corners(nearest.face), nearest.point);
+        }
         let patch = &surface.patches[patch_of_face[face] as usize];
         let [a, b, c] = triangulation.triangles[face].map(VertexId::index);
         let weights = barycentric(triangulation.corners(nearest.face), nearest.point);
@@ -52,6 +73,16 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
         distance(patch, p, start)
     };
     Surface::of_samples(&mesh, samples, Box::new(refine))
+}
+
+/// The distance from `p` to a face of known shape, given the nearest point of its triangulation.
+fn to_shape(shape: &RegionShape, p: DVec3, triangle: [DVec3; 3], nearest: DVec3) -> f64 {
+    let foot = shape.project(p);
+    // Above the inside of the triangle the foot is on the face; beyond its sides perhaps not.
+    if barycentric(triangle, foot).iter().all(|&w| w >= 0.0) {
+        return shape.distance(p).abs();
+    }
+    p.distance(shape.project(nearest))
 }
 
 fn grid(patch: &Patch, spacing: f64) -> Grid {

@@ -1,20 +1,21 @@
-//! The spline surface: counts, volume, closeness, smoothness.
+//! The spline surface: counts, volume, closeness, smoothness, faces of known shape.
 
 mod complex;
 mod continuity;
 mod features;
 mod grid;
+mod shapes;
 mod volume;
 
-pub(crate) use complex::quad_complex;
+pub(crate) use complex::count as count_complex;
 pub(crate) use grid::sample;
 pub use volume::volume_by_quadrature;
 
 use crate::deviation::Surface;
 use crate::{Parameters, SurfaceFigures, ValidationError};
-use topipe_mesh::Part;
+use topipe_mesh::{Part, RegionShape};
 use topipe_progress::Progress;
-use topipe_spline_fit::{Basis, SplineSurface, basis::MAX_DEGREE};
+use topipe_spline_fit::{Basis, PatchSide, SplineSurface, basis::MAX_DEGREE};
 
 /// Refuses indices out of range, control nets of the wrong size and knots that are no clamped basis on [0, 1].
 pub(crate) fn check(surface: &SplineSurface) -> Result<(), ValidationError> {
@@ -43,6 +44,23 @@ pub(crate) fn check(surface: &SplineSurface) -> Result<(), ValidationError> {
             return refuse(format!("edge {e} has a control point that is not finite"));
         }
     }
+    for (k, face) in surface.faces.iter().enumerate() {
+        if face.loops.iter().flatten().any(|side| side.edge as usize >= surface.edges.len()) {
+            return refuse(format!("face {k} names an edge that does not exist"));
+        }
+        if face.loops.iter().any(Vec::is_empty) {
+            return refuse(format!("face {k} has a border without edges"));
+        }
+        let sound = match face.shape {
+            RegionShape::Plane { point, normal } => point.is_finite() && normal.is_normalized(),
+            RegionShape::Cylinder { point, axis, radius, .. } => {
+                point.is_finite() && axis.is_normalized() && radius > 0.0 && radius.is_finite()
+            }
+        };
+        if !sound {
+            return refuse(format!("face {k} is no plane and no cylinder"));
+        }
+    }
     for (k, patch) in surface.patches.iter().enumerate() {
         if patch.sides.iter().any(|side| side.edge as usize >= surface.edges.len()) {
             return refuse(format!("patch {k} names an edge that does not exist"));
@@ -69,32 +87,46 @@ pub(crate) fn figures(
     progress: &Progress,
 ) -> Result<SurfaceFigures, ValidationError> {
     let ends: Vec<[u32; 2]> = surface.edges.iter().map(|edge| edge.ends).collect();
-    let sides = surface.patches.iter().map(|patch| patch.sides.map(|side| (side.edge, side.reversed)));
-    let complex = quad_complex(surface.vertices.len(), &ends, sides);
+    let along = |sides: &[PatchSide]| sides.iter().map(|side| (side.edge, side.reversed)).collect::<Vec<_>>();
+    let patches = surface.patches.iter().map(|patch| vec![along(&patch.sides)]);
+    let faces = surface.faces.iter().map(|face| face.loops.iter().map(|l| along(l)).collect());
+    let complex = count_complex(surface.vertices.len(), &ends, patches.chain(faces));
     let volume_mm3 = volume_by_quadrature(surface);
     progress.check()?;
     let (normal_jump_deg, gap_mm) = continuity::along_edges(surface, parameters.points_per_edge);
     progress.check()?;
+    let mesh_volume = reference.mesh.volume();
+    let cylinders = shapes::cylinders(surface, reference);
+    let rounding_mm3 = cylinders.iter().map(|c| c.rounding_mm3).sum();
     Ok(SurfaceFigures {
         patches: surface.patches.len(),
         control_points: control_points(surface),
         closed: complex.closed,
         genus: complex.genus,
         volume_mm3,
-        volume_error: volume_mm3 / reference.mesh.volume() - 1.0,
+        volume_error: volume_mm3 / mesh_volume - 1.0,
+        rounding_mm3,
+        volume_error_without_rounding: (volume_mm3 - rounding_mm3) / mesh_volume - 1.0,
         deviation: None,
         deviation_original: None,
         normal_jump_deg,
         features: features::figures(surface, &reference.mesh, &reference_surface.index),
         gap_mm,
-        planes: 0,
-        cylinders: 0,
+        planes: surface.faces.len() - cylinders.len(),
+        cylinders: cylinders.len(),
+        flatness_mm: shapes::flatness(surface),
+        round_faces: cylinders,
     })
 }
 
-/// Vertices, inner control points of edges and inner control points of patches.
+/// Vertices, inner control points of the edges of patches and inner control points of patches.
 fn control_points(surface: &SplineSurface) -> usize {
-    let edges: usize = surface.edges.iter().map(|edge| edge.control.len() - 2).sum();
+    let mut of_patch = vec![false; surface.edges.len()];
+    for side in surface.patches.iter().flat_map(|patch| patch.sides) {
+        of_patch[side.edge as usize] = true;
+    }
+    let edges: usize =
+        surface.edges.iter().zip(&of_patch).filter(|(_, of)| **of).map(|(e, _)| e.control.len() - 2).sum();
     let patches: usize =
         surface.patches.iter().map(|patch| (patch.basis_u.len() - 2) * (patch.basis_v.len() - 2)).sum();
     surface.vertices.len() + edges + patches

@@ -1,7 +1,8 @@
 //! The volume inside a closed spline surface by the divergence theorem, exactly.
 //!
 //! V = 1/3 of the integral of S . (S_u x S_v). On a knot span the integrand is a polynomial of degree 3 p - 1 in
-//! each parameter, which Gauss-Legendre quadrature with ceil(3 p / 2) points integrates without error.
+//! each parameter, which Gauss-Legendre quadrature with ceil(3 p / 2) points integrates without error. Planes and
+//! cylinders are integrated along their borders.
 
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -66,7 +67,8 @@ pub fn volume_by_quadrature(surface: &SplineSurface) -> f64 {
             sum
         })
         .collect();
-    pieces.iter().sum::<f64>() / 3.0
+    let faces: f64 = surface.faces.iter().map(|face| face.volume(&surface.edges, center)).sum();
+    pieces.iter().sum::<f64>() / 3.0 + faces
 }
 
 #[cfg(test)]
