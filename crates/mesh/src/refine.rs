@@ -254,6 +254,77 @@ impl Refiner {
         Split { vertex: m, pieces: vec![(f1, face), (f2, face)] }
     }
 
+    /// Takes back the last split, which was that of the edge of `half_edge` towards `target`. The refiner is as it was
+    /// before, ids included.
+    ///
+    /// Only for the very last split that has not been taken back; anything else breaks the connectivity.
+    pub fn undo_split_edge(&mut self, half_edge: HalfEdgeId, target: VertexId) {
+        let (h, a, b) = (half_edge, self.origin(half_edge), target);
+        let m = VertexId::new(self.part.mesh.positions.len() - 1);
+        debug_assert_eq!(self.target(h), m);
+        let last = FaceId::new(self.part.mesh.triangles.len() - 1);
+        let on_border = !self.twin(h).is_some();
+        let f2 = if on_border { last } else { FaceId(last.0 - 1) };
+        let g = self.twin(HalfEdgeId::of(f2, 0));
+        if let Some(kind) = self.features.remove(&key(a, m)) {
+            self.features.remove(&key(m, b));
+            self.features.insert(key(a, b), kind);
+        }
+        self.part.mesh.triangles[h.face().index()][(h.corner() + 1) % 3] = b;
+        self.pair(h.next(), self.twin(HalfEdgeId::of(f2, 1)));
+        if self.outgoing[b.index()] == HalfEdgeId::of(f2, 1) {
+            self.outgoing[b.index()] = h.next();
+        }
+        self.pair(h, g);
+        if !on_border {
+            self.part.mesh.triangles[g.face().index()][(g.corner() + 1) % 3] = a;
+            self.pair(g.next(), self.twin(HalfEdgeId::of(last, 1)));
+            if self.outgoing[a.index()] == HalfEdgeId::of(last, 1) {
+                self.outgoing[a.index()] = g.next();
+            }
+            self.pop_face();
+        } else {
+            self.twin[h.index()] = HalfEdgeId::NONE;
+        }
+        self.pop_face();
+        self.pop_vertex();
+    }
+
+    /// Takes back the last split, which was that of `face`; see [`Self::undo_split_edge`].
+    pub fn undo_split_face(&mut self, face: FaceId) {
+        let faces = self.part.mesh.triangles.len();
+        let (f1, f2) = (FaceId::new(faces - 2), FaceId::new(faces - 1));
+        let [b, c, _] = self.part.mesh.triangles[f1.index()];
+        let [h1, h2] = [1, 2].map(|k| HalfEdgeId::of(face, k));
+        self.part.mesh.triangles[face.index()][2] = c;
+        self.pair(h1, self.twin(HalfEdgeId::of(f1, 0)));
+        self.pair(h2, self.twin(HalfEdgeId::of(f2, 0)));
+        if self.outgoing[b.index()] == HalfEdgeId::of(f1, 0) {
+            self.outgoing[b.index()] = h1;
+        }
+        if self.outgoing[c.index()] == HalfEdgeId::of(f2, 0) {
+            self.outgoing[c.index()] = h2;
+        }
+        self.pop_face();
+        self.pop_face();
+        self.pop_vertex();
+    }
+
+    fn pop_face(&mut self) {
+        self.part.mesh.triangles.pop();
+        self.part.design.pop();
+        self.part.region_of_face.pop();
+        self.parent_face.pop();
+        self.twin.truncate(self.twin.len() - 3);
+    }
+
+    fn pop_vertex(&mut self) {
+        self.part.mesh.positions.pop();
+        self.part.frozen.pop();
+        self.part.provenance.pop();
+        self.outgoing.pop();
+    }
+
     /// The face of the original part that `face` is a piece of.
     #[inline]
     pub fn parent_face(&self, face: FaceId) -> FaceId {
@@ -315,6 +386,39 @@ mod tests {
             assert!(fan.iter().all(|&h| refiner.origin(h) == v));
         }
         assert_eq!(fresh.genus(&refiner.part().mesh), Some(0));
+    }
+
+    #[test]
+    fn splits_are_taken_back_without_a_trace() {
+        let mut refiner = refined();
+        let before = refiner.clone();
+        let mut log = Vec::new();
+        let mut state = 7u64;
+        for step in 0..100 {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            let faces = refiner.part().mesh.face_count();
+            let pick = (state >> 33) as usize;
+            if step % 3 == 0 {
+                let face = FaceId::new(pick % faces);
+                refiner.split_face(face, [0.25, 0.25, 0.5]);
+                log.push((Some(face), HalfEdgeId::NONE, VertexId::NONE));
+            } else {
+                let h = HalfEdgeId::new(pick % (3 * faces));
+                log.push((None, h, refiner.target(h)));
+                refiner.split_edge(h, 0.25);
+            }
+        }
+        for (face, h, target) in log.into_iter().rev() {
+            match face {
+                Some(face) => refiner.undo_split_face(face),
+                None => refiner.undo_split_edge(h, target),
+            }
+        }
+        assert_eq!(refiner.part, before.part);
+        assert_eq!(refiner.twin, before.twin);
+        assert_eq!(refiner.outgoing, before.outgoing);
+        assert_eq!(refiner.parent_face, before.parent_face);
+        assert_eq!(refiner.features, before.features);
     }
 
     #[test]

@@ -27,7 +27,7 @@ impl Regions {
     /// Drops the vertices of the mesh that cutting has made and no macro-edge uses any more.
     pub(crate) fn coarsen(self) -> Result<Self, QuadMatchingError> {
         let Self { tiled, mut vertices, mut edges, sides } = self;
-        let Tiled { refiner, tile_of_face } = tiled;
+        let Tiled { refiner, tile_of_face, .. } = tiled;
         let mut keep = vec![false; refiner.part().mesh.vertex_count()];
         let mut constrained = vec![false; 3 * tile_of_face.len()];
         for edge in &edges {
@@ -48,7 +48,7 @@ impl Regions {
             edge.path.iter_mut().for_each(|v| *v = coarse.vertex[v.index()]);
             edge.path.retain(|v| v.is_some());
         }
-        let tiled = Tiled { refiner: coarse.refiner, tile_of_face: coarse.labels };
+        let tiled = Tiled::over(coarse.refiner, coarse.labels);
         Ok(Self { tiled, vertices, edges, sides })
     }
 }

@@ -3,16 +3,17 @@
 //! The regions around a macro-vertex are mapped to a disk, the vertices joined to it at equal angles; the vertex goes to
 //! the centre and its edges are cut anew, straight. On features the vertex stays where it is and the regions of each
 //! sector between two feature edges are mapped to a sector of the disk. Where that makes the angles of the corners worse
-//! the old paths come back: refinement moves no point, so nothing is lost.
+//! all of it is taken back.
 
 use crate::QuadMatchingError;
 use crate::refine::Regions;
 use crate::sides::Tiled;
-use crate::spokes::{self, Cutter};
+use crate::spokes::Cutter;
+use glam::{DMat2, DVec2};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use topipe_mesh::disk_map::DiskMap;
-use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
+use topipe_mesh::{DVec3, FaceId, HalfEdgeId, TriangleMesh, VertexId};
 use topipe_progress::Progress;
 
 /// Side `k` of a region, and the corner it starts from.
@@ -34,6 +35,17 @@ struct Fan {
     corners: Vec<Corner>,
     /// They go all around; else the first out-side and the last in-side are features.
     closed: bool,
+}
+
+/// How the far ends of the edges are placed on the circle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Plan {
+    /// At equal angles.
+    Equal,
+    /// So that the angles between the edges are equal on the surface, which the map shears.
+    Sheared,
+    /// By length along the border.
+    Length,
 }
 
 /// Which corners meet where; relaxation changes none of it.
@@ -105,7 +117,9 @@ pub(crate) fn relax(
             progress.step(v as u64, incidence.fans.len() as u64, "vertices");
         }
         for fan in fans.iter().filter(|fan| fan.corners.len() > 1) {
-            changed += relax_one(regions, v, fan, only_bad, snap) as usize;
+            let plans =
+                if only_bad { &[Plan::Equal, Plan::Sheared, Plan::Length][..] } else { &[Plan::Equal] };
+            changed += plans.iter().any(|&plan| relax_one(regions, v, fan, plan, only_bad, snap)) as usize;
         }
     }
     Ok(changed)
@@ -143,7 +157,7 @@ fn star_cost(regions: &Regions, fan: &Fan) -> f64 {
     sum
 }
 
-fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, only_bad: bool, snap: f64) -> bool {
+fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, plan: Plan, only_bad: bool, snap: f64) -> bool {
     let members: Vec<usize> = fan.corners.iter().map(|c| c.0).collect();
     if members.iter().collect::<HashSet<_>>().len() != members.len() {
         return false;
@@ -196,28 +210,51 @@ fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, only_bad: bool, snap: f
         .collect();
     let faces = flood(&regions.tiled, vertex, &members);
 
-    // Equal angles between the edges at the vertex; in between by length.
     let mesh = &regions.tiled.refiner.part().mesh;
-    let mut fixed: HashMap<VertexId, glam::DVec2> = HashMap::with_capacity(border.len());
     let sector = if fan.closed { TAU } else { 0.95 * PI };
-    for i in 0..n {
-        let end = if i + 1 < n { begins[i + 1] } else { ring.len() };
-        let stop = if i + 1 < n { ring[begins[i + 1]] } else { ring_end };
-        let chain: Vec<VertexId> = ring[begins[i]..end].iter().copied().chain([stop]).collect();
-        place(&mut fixed, mesh, &chain, |share| {
-            glam::DVec2::from_angle(sector * (i as f64 + share) / n as f64)
-        });
+    let (out, into) =
+        if fan.closed { (Vec::new(), Vec::new()) } else { (path(regions, fan.corners[0]), last_in(regions)) };
+    let mut angles: Vec<f64> = (0..=n).map(|i| sector * i as f64 / n as f64).collect();
+    if plan == Plan::Length {
+        let at = |i: usize| mesh.position(if i < ring.len() { ring[i] } else { ring_end });
+        let mut along = vec![0.0];
+        (0..ring.len()).for_each(|i| along.push(along[i] + at(i).distance(at(i + 1))));
+        let total = along[ring.len()];
+        if total > 0.0 {
+            (1..n).for_each(|i| angles[i] = sector * along[begins[i]] / total);
+        }
     }
-    if !fan.closed {
-        let out = path(regions, fan.corners[0]);
-        place(&mut fixed, mesh, &out, |share| glam::DVec2::new(share, 0.0));
-        let into = last_in(regions);
-        place(&mut fixed, mesh, &into, |share| glam::DVec2::from_angle(sector) * (1.0 - share));
+    let mut map = None;
+    for round in 0..=SHEAR_ROUNDS {
+        let mut fixed: HashMap<VertexId, DVec2> = HashMap::with_capacity(border.len());
+        for i in 0..n {
+            let (end, stop) =
+                if i + 1 < n { (begins[i + 1], ring[begins[i + 1]]) } else { (ring.len(), ring_end) };
+            let chain: Vec<VertexId> = ring[begins[i]..end].iter().copied().chain([stop]).collect();
+            place(&mut fixed, mesh, &chain, |share| {
+                DVec2::from_angle(angles[i] + (angles[i + 1] - angles[i]) * share)
+            });
+        }
+        if !fan.closed {
+            place(&mut fixed, mesh, &out, |share| DVec2::new(share, 0.0));
+            place(&mut fixed, mesh, &into, |share| DVec2::from_angle(sector) * (1.0 - share));
+        }
+        let Some(solved) = DiskMap::solve(mesh, &faces, &fixed) else { break };
+        if solved.flipped(mesh, &faces) > 0 {
+            break;
+        }
+        let sheared =
+            if plan == Plan::Sheared && round < SHEAR_ROUNDS { shear(mesh, &faces, &solved) } else { None };
+        map = Some(solved);
+        let Some(shear) = sheared else { break };
+        let Some(better) = equal_on_surface(shear, n, sector) else { break };
+        let change = angles.iter().zip(&better).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        angles = better;
+        if change < 0.1 {
+            break;
+        }
     }
-    let Some(map) = DiskMap::solve(mesh, &faces, &fixed) else { return false };
-    if map.flipped(mesh, &faces) > 0 {
-        return false;
-    }
+    let Some(map) = map else { return false };
 
     let id = members[0] as u32;
     let labels: Vec<u32> = faces.iter().map(|f| regions.tiled.tile_of_face[f.index()]).collect();
@@ -226,6 +263,7 @@ fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, only_bad: bool, snap: f
     for f in &faces {
         regions.tiled.tile_of_face[f.index()] = id;
     }
+    regions.tiled.begin();
     let mut cutter = Cutter::within(id, border.iter().copied(), map, snap);
     let site = if fan.closed { cutter.center(&mut regions.tiled, &faces, CENTER) } else { vertex };
     let mut paths = Vec::with_capacity(targets.len());
@@ -238,33 +276,80 @@ fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, only_bad: bool, snap: f
             None => break,
         }
     }
-    // Pieces of the faces that were cut.
-    let faces: Vec<FaceId> =
-        faces.into_iter().chain((first_new..regions.tiled.tile_of_face.len()).map(FaceId::new)).collect();
+    // With the pieces of the faces that were cut.
+    let pieces = (first_new..regions.tiled.tile_of_face.len()).map(FaceId::new);
     if paths.len() == targets.len() {
+        let all: Vec<FaceId> = faces.iter().copied().chain(pieces).collect();
         set(regions, &spokes, &paths);
         regions.vertices[v] = site;
-        if fill(regions, &faces, fan, &ring, &begins)
+        if fill(regions, &all, fan, &ring, &begins)
             && star_cost(regions, fan) <= before + if only_bad { -1e-9 } else { PATIENCE }
         {
+            regions.tiled.commit();
             return true;
         }
     }
-    // Back to the old paths, with the vertices that were put on them.
-    let old_paths: Vec<Vec<VertexId>> =
-        old_paths.into_iter().map(|path| spokes::with_cuts(path, &cutter.cuts)).collect();
+    regions.tiled.roll_back();
     set(regions, &spokes, &old_paths);
     regions.vertices[v] = vertex;
-    for f in &faces {
-        regions.tiled.tile_of_face[f.index()] = id;
-    }
-    if !fill(regions, &faces, fan, &ring, &begins) {
-        // Not reached unless an old path was damaged; labels are at least those of the faces as they were.
-        for (f, label) in faces.iter().zip(labels) {
-            regions.tiled.tile_of_face[f.index()] = label;
-        }
+    for (f, label) in faces.iter().zip(labels) {
+        regions.tiled.tile_of_face[f.index()] = label;
     }
     false
+}
+
+/// How often the map is computed anew for the shear it has at the centre.
+const SHEAR_ROUNDS: usize = 2;
+
+/// The linear map from the tangent plane at the centre of the disk to the disk, by least squares over the faces there.
+fn shear(mesh: &TriangleMesh, faces: &[FaceId], map: &DiskMap) -> Option<DMat2> {
+    let near: Vec<FaceId> = faces
+        .iter()
+        .copied()
+        .filter(|f| mesh.triangles[f.index()].iter().any(|&v| map.at(v).length() < NEAR))
+        .collect();
+    let normal = near.iter().map(|&f| mesh.area_vector(f)).sum::<DVec3>().try_normalize()?;
+    let x = normal.any_orthonormal_vector();
+    let y = normal.cross(x);
+    let (mut qp, mut pp) = (DMat2::ZERO, DMat2::ZERO);
+    for f in near {
+        let corners = mesh.triangles[f.index()];
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            let e = mesh.position(b) - mesh.position(a);
+            let (p, q) = (DVec2::new(e.dot(x), e.dot(y)), map.at(b) - map.at(a));
+            qp += DMat2::from_cols(q * p.x, q * p.y);
+            pp += DMat2::from_cols(p * p.x, p * p.y);
+        }
+    }
+    let shear = qp * pp.inverse();
+    (shear.is_finite() && shear.determinant() > 0.0).then_some(shear)
+}
+
+/// Faces with a vertex within this part of the radius show the shear at the centre.
+const NEAR: f64 = 0.25;
+
+/// Angles in the disk, from 0 to `sector`, that are equal on the surface.
+fn equal_on_surface(shear: DMat2, n: usize, sector: f64) -> Option<Vec<f64>> {
+    let back = shear.inverse();
+    let first = back * DVec2::X;
+    let total = if sector < TAU {
+        let angle = first.angle_to(back * DVec2::from_angle(sector));
+        if angle > 0.0 { angle } else { angle + TAU }
+    } else {
+        TAU
+    };
+    let mut angles = vec![0.0];
+    for i in 1..n {
+        let direction = DVec2::from_angle(total * i as f64 / n as f64).rotate(first);
+        let q = shear * direction;
+        let angle = q.y.atan2(q.x).rem_euclid(TAU);
+        // No part of the circle narrower than a tenth of its fair share.
+        angles.push(angle.max(angles[i - 1] + 0.1 * sector / n as f64));
+    }
+    angles.push(sector);
+    let narrowest = angles.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
+    (narrowest >= 0.09 * sector / n as f64 && angles.iter().all(|a| a.is_finite())).then_some(angles)
 }
 
 /// A vertex nearer to the centre of the disk than this is taken for it: 0.1 of the radius turns edges by 6 degrees.
@@ -274,10 +359,10 @@ const PATIENCE: f64 = 0.2;
 
 /// Places a chain of vertices but for its last by its length.
 fn place(
-    fixed: &mut HashMap<VertexId, glam::DVec2>,
-    mesh: &topipe_mesh::TriangleMesh,
+    fixed: &mut HashMap<VertexId, DVec2>,
+    mesh: &TriangleMesh,
     chain: &[VertexId],
-    at: impl Fn(f64) -> glam::DVec2,
+    at: impl Fn(f64) -> DVec2,
 ) {
     let points: Vec<DVec3> = chain.iter().map(|&v| mesh.position(v)).collect();
     let total: f64 = points.windows(2).map(|w| w[0].distance(w[1])).sum();

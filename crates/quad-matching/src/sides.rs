@@ -6,19 +6,51 @@
 use crate::QuadMatchingError;
 use std::collections::{BTreeMap, HashMap};
 use topipe_mesh::refine::Refiner;
-use topipe_mesh::{FeatureKind, HalfEdgeId, VertexId};
+use topipe_mesh::{FaceId, FeatureKind, HalfEdgeId, VertexId};
 use topipe_tiling::Tiling;
 
 /// A tile while the mesh is refined: the refiner, and the tile of each face.
 pub(crate) struct Tiled {
     pub(crate) refiner: Refiner,
     pub(crate) tile_of_face: Vec<u32>,
+    /// Splits that can be taken back, while that is asked for.
+    log: Option<Vec<Step>>,
+}
+
+/// A split that can be taken back.
+enum Step {
+    Edge(HalfEdgeId, VertexId),
+    Face(FaceId),
 }
 
 impl Tiled {
     pub(crate) fn new(tiling: &Tiling) -> Result<Self, QuadMatchingError> {
         let refiner = Refiner::new(&tiling.part)?;
-        Ok(Self { refiner, tile_of_face: tiling.tile_of_face.iter().map(|t| t.0).collect() })
+        Ok(Self::over(refiner, tiling.tile_of_face.iter().map(|t| t.0).collect()))
+    }
+
+    pub(crate) fn over(refiner: Refiner, tile_of_face: Vec<u32>) -> Self {
+        Self { refiner, tile_of_face, log: None }
+    }
+
+    /// From here on splits can be taken back with [`Self::roll_back`], until [`Self::commit`].
+    pub(crate) fn begin(&mut self) {
+        self.log = Some(Vec::new());
+    }
+
+    pub(crate) fn commit(&mut self) {
+        self.log = None;
+    }
+
+    /// Takes back all splits since [`Self::begin`]. Tiles of faces that were there before stay as they are now.
+    pub(crate) fn roll_back(&mut self) {
+        for step in self.log.take().into_iter().flatten().rev() {
+            match step {
+                Step::Edge(h, target) => self.refiner.undo_split_edge(h, target),
+                Step::Face(face) => self.refiner.undo_split_face(face),
+            }
+        }
+        self.tile_of_face.truncate(self.refiner.part().mesh.face_count());
     }
 
     pub(crate) fn tile(&self, h: HalfEdgeId) -> u32 {
@@ -31,6 +63,9 @@ impl Tiled {
     }
 
     pub(crate) fn split_edge(&mut self, h: HalfEdgeId, t: f64) -> VertexId {
+        if let Some(log) = &mut self.log {
+            log.push(Step::Edge(h, self.refiner.target(h)));
+        }
         let split = self.refiner.split_edge(h, t);
         for (_, from) in &split.pieces {
             self.tile_of_face.push(self.tile_of_face[from.index()]);
@@ -38,7 +73,10 @@ impl Tiled {
         split.vertex
     }
 
-    pub(crate) fn split_face(&mut self, face: topipe_mesh::FaceId, weights: [f64; 3]) -> VertexId {
+    pub(crate) fn split_face(&mut self, face: FaceId, weights: [f64; 3]) -> VertexId {
+        if let Some(log) = &mut self.log {
+            log.push(Step::Face(face));
+        }
         let split = self.refiner.split_face(face, weights);
         for (_, from) in &split.pieces {
             self.tile_of_face.push(self.tile_of_face[from.index()]);

@@ -165,12 +165,8 @@ pub(crate) fn recut(
     if let Some(path) = cutter.straight(tiled, from, to) {
         return path;
     }
-    with_cuts(old.to_vec(), &cutter.cuts)
-}
-
-/// A path with the vertices that have been put on its edges since.
-pub(crate) fn with_cuts(mut path: Vec<VertexId>, cuts: &[([VertexId; 2], VertexId)]) -> Vec<VertexId> {
-    for &(edge, vertex) in cuts {
+    let mut path = old.to_vec();
+    for (edge, vertex) in cutter.cuts {
         if let Some(k) = path.windows(2).position(|w| key(w[0], w[1]) == edge) {
             path.insert(k + 1, vertex);
         }
@@ -181,7 +177,7 @@ pub(crate) fn with_cuts(mut path: Vec<VertexId>, cuts: &[([VertexId; 2], VertexI
 /// Cuts paths into the mesh of one tile, straight in its map.
 pub(crate) struct Cutter {
     /// Edges that were cut, in order, and the vertices that cut them.
-    pub(crate) cuts: Vec<([VertexId; 2], VertexId)>,
+    cuts: Vec<([VertexId; 2], VertexId)>,
     map: DiskMap,
     border: HashSet<VertexId>,
     on_spoke: HashSet<VertexId>,
