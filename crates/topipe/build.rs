@@ -10,9 +10,10 @@ use std::path::{Path, PathBuf};
 
 /// Stage, its crate, and the file of its adapter in `stages` and of its writers in `export`. Pictures are no stage, they
 /// have a writer only.
-const PARTS: [(&str, &str, &str); 9] = [
+const PARTS: [(&str, &str, &str); 10] = [
     ("IMPORT", "mesh", "import.rs"),
     ("SMOOTHING", "smoothing", "smoothing.rs"),
+    ("SMOOTHING_STUDY", "smoothing", "smoothing_study.rs"),
     ("TILING", "tiling", "tiling.rs"),
     ("QUAD_MATCHING", "quad-matching", "quad_matching.rs"),
     ("SPLINE_FIT", "spline-fit", "spline_fit.rs"),

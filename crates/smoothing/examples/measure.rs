@@ -132,7 +132,7 @@ fn main() {
         let mut value = || arguments.next().expect("a value");
         match path.as_str() {
             "--write" => write = Some(value()),
-            "--alpha" => parameters.alpha = value().parse().expect("a number"),
+            "--alpha" => parameters.alpha = Some(value().parse().expect("a number")),
             "--beta" => parameters.beta = value().parse().expect("a number"),
             "--tolerance" => parameters.tolerance = value().parse().expect("a number"),
             "--floor" => parameters.weight_floor = value().parse().expect("a number"),

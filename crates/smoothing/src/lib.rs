@@ -44,6 +44,7 @@
 //! # Ok::<(), topipe_smoothing::SmoothingError>(())
 //! ```
 
+mod alpha;
 mod error;
 pub mod features;
 mod finish;
@@ -52,6 +53,7 @@ mod methods;
 mod outline;
 mod parameters;
 mod smooth;
+pub mod study;
 mod volume;
 
 pub use error::SmoothingError;

@@ -54,21 +54,6 @@ pub enum Weights {
     Updated,
 }
 
-/// The paper's 0.27 keeps 18 % of the waves of four edges' length and 57 % of those of six (from the eigenvalues of the
-/// iteration), which is the size of the bumps that spikes turn into: the struts of the cantilever looked hammered. The
-/// 90th percentile of the dihedral angle within the free surface, in degrees, with the iterations to converge:
-///
-/// | alpha | bracket | bell-crank | cantilever |
-/// |---|---|---|---|
-/// | 0.27 | 51 (27) | 34 (24) | 50 (24) |
-/// | 0.1  | 41 (60) | 21 (50) | 45 (53) |
-/// | 0.05 | 37 (107) | 18 (89) | 43 (98) |
-/// | ten plain Laplacian steps | 28 | 15 | 43 |
-///
-/// 0.1 takes most of what can be had and still converges in under 96 iterations, the paper's count. With 0.05 thin
-/// edges get sharper (largest dihedral angle of the bracket 168 instead of 164 degrees).
-const DEFAULT_ALPHA: f64 = 0.1;
-
 /// Below 1e-3 nothing changes that can be seen; from 1e-3 to 1e-4 the percentiles above move by less than a degree. The
 /// paper's 0.01 has a unit and no norm.
 const DEFAULT_TOLERANCE: f64 = 2e-4;
@@ -79,10 +64,10 @@ const DEFAULT_TOLERANCE: f64 = 2e-4;
 pub struct Parameters {
     /// How vertices are moved.
     pub method: Method,
-    /// Pull towards the input, 0 to 1 (hc, hc-sdu): less is smoother. Bacciaglia et al. 2021 use 0.27 for a part with
-    /// a third of its vertices frozen and 0.8 for one with half of them; both leave visible bumps, see `DEFAULT_ALPHA`
-    /// in the source. Vollmer et al. 1999 call the whole range convergent.
-    pub alpha: f64,
+    /// Pull towards the input, 0 to 1 (hc, hc-sdu): less is smoother. Unless set: for hc-sdu from the noise of the free
+    /// surface, 0.8 where there is hardly any to 0.06 on the spikes of an optimizer's result; 0.1 for hc. Bacciaglia et al. 2021 use 0.27 and 0.8, found by trial; Vollmer et al. 1999 call the
+    /// whole range convergent.
+    pub alpha: Option<f64>,
     /// Share of a vertex's own difference in the push back, 0.5 to 1 (hc, hc-sdu; Vollmer et al. 1999).
     pub beta: f64,
     /// Step towards the neighbours, above 0 and at most 1 (all but hc, which makes full steps). 0.6307: Taubin 1995.
@@ -146,7 +131,7 @@ impl Default for Parameters {
     fn default() -> Self {
         Self {
             method: Method::HcSdu,
-            alpha: DEFAULT_ALPHA,
+            alpha: None,
             beta: 0.51,
             lambda: 0.6307,
             mu: -0.6732,
@@ -207,8 +192,8 @@ impl Parameters {
         if matches!(self.method, Method::Hc | Method::HcSdu) {
             check(
                 "alpha",
-                self.alpha,
-                (0.0..=1.0).contains(&self.alpha),
+                self.alpha.unwrap_or(0.0),
+                self.alpha.is_none_or(|a| (0.0..=1.0).contains(&a)),
                 "between 0 and 1",
                 "Humphrey's Classes converges there: Vollmer, Mencl, Müller 1999",
             )?;

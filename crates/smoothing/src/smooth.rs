@@ -1,5 +1,6 @@
 //! The loop: freeze, step, project, restore the volume, stop.
 
+use crate::alpha;
 use crate::features::{self, Features};
 use crate::finish::{Finish, Mended};
 use crate::kernel::{Domain, Slide, change};
@@ -22,6 +23,19 @@ const DIVERGED: f64 = 100.0;
 ///
 /// See the [crate] for guarantees.
 pub fn smooth(part: &Part, parameters: &Parameters, progress: &Progress) -> Result<Part, SmoothingError> {
+    smooth_observed(part, parameters, progress, &mut |_, _, _| false)
+}
+
+/// Is shown the positions before and after an iteration and the volume after it; says whether to stop.
+pub(crate) type Observer<'a> = dyn FnMut(&[DVec3], &[DVec3], f64) -> bool + 'a;
+
+/// As [`smooth`], and shows each iteration to `observe`.
+pub(crate) fn smooth_observed(
+    part: &Part,
+    parameters: &Parameters,
+    progress: &Progress,
+    observe: &mut Observer<'_>,
+) -> Result<Part, SmoothingError> {
     parameters.check()?;
     check_attributes(part)?;
     let mesh = &part.mesh;
@@ -46,8 +60,13 @@ pub fn smooth(part: &Part, parameters: &Parameters, progress: &Progress) -> Resu
         record.converged = true;
     } else {
         let domain = domain(&connectivity, &features, &frozen, mesh.vertex_count());
-        result.mesh.positions =
-            iterate(part, &connectivity, &features, &domain, parameters, progress, &mut record)?;
+        result.mesh.positions = iterate(
+            &Setup { part, connectivity: &connectivity, features: &features, domain: &domain },
+            parameters,
+            progress,
+            &mut record,
+            observe,
+        )?;
     }
     let solid: Vec<bool> = mesh.triangles.iter().map(|t| t.iter().all(|v| frozen[v.index()])).collect();
     features.measure(&result.mesh);
@@ -136,16 +155,42 @@ fn domain(connectivity: &Connectivity, features: &Features, frozen: &[bool], ver
     Domain { start, neighbors, slides }
 }
 
+/// The parameters with an `alpha`.
+fn settle_alpha(
+    parameters: &Parameters,
+    domain: &Domain,
+    positions: &[DVec3],
+    edge: f64,
+    progress: &Progress,
+) -> Parameters {
+    let mut settled = parameters.clone();
+    if settled.alpha.is_none() && settled.method == Method::HcSdu {
+        let noise = alpha::noise(domain, positions, edge);
+        let alpha = alpha::from_noise(noise);
+        let noise = noise.unwrap_or(f64::NAN);
+        progress.remark(&format!("alpha = {alpha:.3}, from a noise of {noise:.3} mean edge lengths"));
+        settled.alpha = Some(alpha);
+    }
+    settled
+}
+
+/// What stays the same during the iteration.
+struct Setup<'a> {
+    part: &'a Part,
+    connectivity: &'a Connectivity,
+    features: &'a Features,
+    domain: &'a Domain,
+}
+
 /// Iterates until the step is small, and returns the new positions.
 fn iterate(
-    part: &Part,
-    connectivity: &Connectivity,
-    features: &Features,
-    domain: &Domain,
+    setup: &Setup<'_>,
     parameters: &Parameters,
     progress: &Progress,
     record: &mut SmoothingRecord,
+    observe: &mut Observer<'_>,
 ) -> Result<Vec<DVec3>, SmoothingError> {
+    let Setup { part, connectivity, features, domain } = *setup;
     let mesh = &part.mesh;
     let original = &mesh.positions;
     let free = domain.free_count();
@@ -169,6 +214,7 @@ fn iterate(
             return Err(SmoothingError::ZeroVolume { volume: keeper.wanted() });
         }
     }
+    let parameters = &settle_alpha(parameters, domain, original, edge, progress);
     let mut step = methods::choose(parameters, domain, original);
     let guard = OutlineGuard::new(mesh, features, domain);
     let mut current = original.clone();
@@ -200,7 +246,7 @@ fn iterate(
         if !rms.is_finite() || rms > DIVERGED {
             return Err(SmoothingError::Diverged { iteration, step: rms });
         }
-        if rms < parameters.tolerance {
+        if observe(&next, &current, volume) || rms < parameters.tolerance {
             record.converged = true;
             break;
         }

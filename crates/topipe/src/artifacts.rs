@@ -30,6 +30,8 @@ kinds! {
     Skeleton = "skeleton" v 2: topipe_skeleton::Skeleton;
     /// Beams between shared nodes.
     Beams = "beam structure" v 1: topipe_beams::Structure;
+    /// A comparison of smoothing methods.
+    Study = "smoothing study" v 1: topipe_smoothing::study::Study;
     /// The figures of a validation.
-    Report = "report" v 1: topipe_validation::Report;
+    Report = "report" v 2: topipe_validation::Report;
 }

@@ -17,8 +17,12 @@ fn tube() -> SplineSurface {
         let at = DVec3::new(radius, 0.0, z);
         EdgeCurve::arc(DVec3::Z * z, DVec3::Z, radius, [v, v], [at, at], 1e-9)
     };
-    let edges =
-        vec![circle(0, OUTER, 0.0), circle(1, OUTER, HEIGHT), circle(2, INNER, 0.0), circle(3, INNER, HEIGHT)];
+    let edges = vec![
+        circle(0, OUTER, 0.0),
+        circle(1, OUTER, HEIGHT),
+        circle(2, INNER, 0.0),
+        circle(3, INNER, HEIGHT),
+    ];
     let rim = |edge: u32, reversed: bool| vec![PatchSide { edge, reversed }];
     let wall = |radius, hole| RegionShape::Cylinder { point: DVec3::Z, axis: DVec3::Z, radius, hole };
     let plane = |z: f64, normal| RegionShape::Plane { point: DVec3::Z * z, normal };

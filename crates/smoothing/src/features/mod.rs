@@ -17,6 +17,7 @@ mod fit;
 mod noise;
 mod overrides;
 mod plane;
+pub mod published;
 
 use crate::{Method, Parameters, SmoothingError};
 use topipe_mesh::{
@@ -289,6 +290,15 @@ fn distance(shape: &RegionShape, p: DVec3) -> f64 {
             fit::Cylinder { point, axis, radius }.distance(p)
         }
     }
+}
+
+/// The diameter of the cylinder of least squares through faces that were on `shape`; `None` where they are on none.
+pub(crate) fn diameter(mesh: &TriangleMesh, shape: RegionShape, faces: &[FaceId]) -> Option<f64> {
+    let RegionShape::Cylinder { point, axis, radius, .. } = shape else { return None };
+    let points = cylinder::points(mesh, faces);
+    let fitted = fit::Cylinder { point, axis, radius }.refine(&points, 50)?;
+    // A wall that lies off its cylinder by a quarter of the radius is none.
+    (fitted.misfit(&points) < 0.25 * fitted.radius).then_some(2.0 * fitted.radius)
 }
 
 /// The shape of least squares through faces that were found with a shape near it.

@@ -16,7 +16,11 @@ pub(super) struct Hc {
 
 impl Hc {
     pub(super) fn new(parameters: &Parameters, vertices: usize) -> Self {
-        Self { alpha: parameters.alpha, beta: parameters.beta, difference: vec![DVec3::ZERO; vertices] }
+        Self {
+            alpha: parameters.alpha.unwrap_or(super::UNSET_ALPHA),
+            beta: parameters.beta,
+            difference: vec![DVec3::ZERO; vertices],
+        }
     }
 }
 

@@ -31,7 +31,7 @@ impl HcSdu {
         let mut weights = Vec::new();
         scale_dependent(domain, original, parameters.weight_floor, &mut weights);
         Self {
-            alpha: parameters.alpha,
+            alpha: parameters.alpha.unwrap_or(super::UNSET_ALPHA),
             beta: parameters.beta,
             lambda: parameters.lambda,
             floor: parameters.weight_floor,

@@ -10,6 +10,9 @@ use crate::kernel::Domain;
 use crate::{Method, Parameters};
 use topipe_mesh::DVec3;
 
+/// `alpha` where neither the user nor the mesh says one.
+const UNSET_ALPHA: f64 = 0.1;
+
 /// One iteration of a method. It leaves vertices with empty rows where they are, bit by bit.
 pub(crate) trait Step {
     /// Computes `next` from `current` and from the mesh before the first iteration.

@@ -17,8 +17,11 @@ fn parameters_out_of_range_name_the_range_and_its_source() {
     let part = Part::new(sphere(1, DVec3::ZERO));
     let plain = Parameters::default();
     let cases = [
-        (Parameters { alpha: 1.5, ..plain.clone() }, ["`alpha` is 1.5", "between 0 and 1", "Vollmer"]),
-        (Parameters { alpha: f64::NAN, ..plain.clone() }, ["`alpha` is NaN", "between 0 and 1", "Vollmer"]),
+        (Parameters { alpha: Some(1.5), ..plain.clone() }, ["`alpha` is 1.5", "between 0 and 1", "Vollmer"]),
+        (
+            Parameters { alpha: Some(f64::NAN), ..plain.clone() },
+            ["`alpha` is NaN", "between 0 and 1", "Vollmer"],
+        ),
         (Parameters { beta: 0.4, ..plain.clone() }, ["`beta` is 0.4", "between 0.5 and 1", "Vollmer"]),
         (Parameters { lambda: 0.0, ..plain.clone() }, ["`lambda` is 0", "above 0 and at most 1", "Taubin"]),
         (
@@ -42,7 +45,7 @@ fn parameters_out_of_range_name_the_range_and_its_source() {
         assert!(words.iter().all(|w| message.contains(w)), "{message}");
     }
     // A field that the method does not use is not checked.
-    let unused = Parameters { alpha: 7.0, method: Method::Laplacian, ..plain };
+    let unused = Parameters { alpha: Some(7.0), method: Method::Laplacian, ..plain };
     assert!(smooth(&part, &unused, &Progress::silent()).is_ok());
 }
 

@@ -54,6 +54,6 @@ fn spikes_are_blunted() {
         let (before, with, without) = (sharp(&part.mesh), sharp(&blunt.mesh), sharp(&left.mesh));
         assert!(with.0 * 2 <= without.0, "{case}: {} of {} edges", with.0, without.0);
         assert!(with.0 * 20 <= before.0, "{case}: {} of {} edges", with.0, before.0);
-        assert!(with.1 < before.1 - 15.0, "{case}: largest angle {} of {}", with.1, before.1);
+        assert!(with.1 < before.1 && with.1 < 160.0, "{case}: largest angle {} of {}", with.1, before.1);
     }
 }

@@ -233,7 +233,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 fn an_outline_does_not_pass_the_frozen_inside_of_its_face() {
     // A prism whose top has a deep notch next to frozen vertices: straightening the outline would cross them.
     let part = Part::new(notched_prism());
-    let parameters = Parameters { alpha: 0.0, tolerance: 0.0, ..Parameters::default() };
+    let parameters = Parameters { alpha: Some(0.0), tolerance: 0.0, ..Parameters::default() };
     let result = smoothed(&part, &parameters);
     let mut slid = 0;
     for f in part.mesh.faces() {

@@ -1,5 +1,6 @@
 //! What smoothing promises, checked on recomputed optimization results and on shapes with known answers.
 
+mod alpha;
 mod bad_input;
 mod detection;
 mod embedding;

@@ -88,7 +88,7 @@ fn humphreys_classes_shrink_less_than_laplacian() {
 fn a_higher_alpha_stays_closer_to_the_input() {
     let part = noisy_sphere();
     let change = |alpha| {
-        smoothed(&part, &Parameters { alpha, ..Parameters::default() })
+        smoothed(&part, &Parameters { alpha: Some(alpha), ..Parameters::default() })
             .smoothing
             .expect("a record")
             .total_change
@@ -142,7 +142,7 @@ proptest! {
         shake(&mut mesh, size, seed);
         let mut part = Part::new(mesh);
         part.frozen.iter_mut().step_by(7).for_each(|f| *f = true);
-        let parameters = Parameters { alpha, beta, lambda, weight_floor: floor, iterations: Some(20), ..Parameters::default() };
+        let parameters = Parameters { alpha: Some(alpha), beta, lambda, weight_floor: floor, iterations: Some(20), ..Parameters::default() };
         let result = smoothed(&part, &parameters);
         prop_assert!((result.mesh.volume() / part.mesh.volume() - 1.0).abs() <= 1e-12);
         for v in part.mesh.vertices().filter(|v| part.frozen[v.index()]) {

@@ -4,9 +4,11 @@
 mod beams;
 mod import;
 mod picture;
+mod plot;
 mod quad_matching;
 mod skeleton;
 mod smoothing;
+mod smoothing_study;
 mod spline_fit;
 mod validation;
 
@@ -17,6 +19,7 @@ pub(crate) fn exporters() -> impl Iterator<Item = Exporter> {
     import::exporters()
         .into_iter()
         .chain(smoothing::exporters())
+        .chain(smoothing_study::exporters())
         .chain(spline_fit::exporters())
         .chain(quad_matching::exporters())
         .chain(skeleton::exporters())

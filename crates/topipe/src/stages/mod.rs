@@ -5,6 +5,7 @@ mod import;
 mod quad_matching;
 mod skeleton;
 mod smoothing;
+mod smoothing_study;
 mod spline_fit;
 mod tiling;
 mod validation;
@@ -16,6 +17,7 @@ pub fn registry() -> Registry {
     Registry::new()
         .with_stage(import::Import)
         .with_stage(smoothing::Smoothing)
+        .with_stage(smoothing_study::SmoothingStudy)
         .with_stage(tiling::Tiling)
         .with_stage(quad_matching::QuadMatching)
         .with_stage(spline_fit::SplineFit)
@@ -96,6 +98,6 @@ mod tests {
         assert!(versions.iter().all(|version| version.len() == 16));
         versions.sort();
         versions.dedup();
-        assert_eq!(versions.len(), 8);
+        assert_eq!(versions.len(), 9);
     }
 }
