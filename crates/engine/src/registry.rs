@@ -31,7 +31,7 @@ impl From<StageError> for ExportError {
 pub struct Exporter {
     /// The kind it writes.
     pub artifact: ArtifactType,
-    /// The ending of the file name that selects it, without the dot.
+    /// The ending of the file name that selects it, without the first dot: "step", "ap242.step".
     pub ending: &'static str,
     /// Identifies the code, so that a better writer rewrites the export.
     pub code_version: String,
@@ -39,8 +39,8 @@ pub struct Exporter {
 }
 
 impl Exporter {
-    /// A writer of `K` for files that end in `ending`; it is given the artifact, the stem of the file's name and
-    /// the file.
+    /// A writer of `K` for files that end in `ending`; it is given the artifact, the file's name
+    /// without that ending, and the file.
     pub fn new<K: ArtifactKind>(
         ending: &'static str,
         code_version: impl Into<String>,
@@ -117,6 +117,15 @@ impl Registry {
         self.exporters
             .iter()
             .find(|exporter| exporter.artifact == *artifact && exporter.ending.eq_ignore_ascii_case(ending))
+    }
+
+    /// The writer of an artifact for a file, by the longest ending that has one: `part.ap242.step` is written by that of
+    /// `ap242.step` if there is one, else by that of `step`.
+    pub fn exporter_of_file(&self, artifact: &ArtifactType, file: &str) -> Option<&Exporter> {
+        let name = file.rsplit('/').next().unwrap_or(file);
+        // A name that is nothing but an ending has none.
+        let dots = name.match_indices('.').map(|(at, _)| at).filter(|&at| at > 0);
+        dots.filter_map(|at| self.exporter(artifact, &name[at + 1..])).next()
     }
 
     /// The endings in which an artifact can be written.

@@ -69,7 +69,7 @@ impl AnalyticFace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{PatchSide, SplineSurface};
+    use crate::{CurveShape, PatchSide, SplineSurface};
     use std::f64::consts::PI;
 
     /// A ring of revolution: outer wall, inner wall, two plane rings; all rims are two half circles.
@@ -186,5 +186,23 @@ mod tests {
         assert_eq!((count("=PLANE("), count("=CYLINDRICAL_SURFACE(")), (2, 2));
         assert_eq!((count("'hole 1, diameter 6 mm'"), count("'boss 1, diameter 10 mm'")), (1, 1));
         assert!(file.contains("AP242_MANAGED_MODEL_BASED_3D_ENGINEERING"));
+    }
+
+    #[test]
+    fn control_nets_read_back_bit_for_bit() {
+        let surface = tube(DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.1, 0.2, 0.3), 5.0, 3.0, 7.0);
+        let mut text = Vec::new();
+        crate::control_nets::write(&surface, &mut text).unwrap();
+        let json: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        let number = |value: &serde_json::Value| value.as_f64().unwrap();
+        for (edge, read) in surface.edges.iter().zip(json["edges"].as_array().unwrap()) {
+            for (p, q) in edge.control.iter().zip(read["control"].as_array().unwrap()) {
+                assert_eq!(p.to_array(), [0, 1, 2].map(|k| number(&q[k])));
+            }
+            let CurveShape::Arc { radius, .. } = edge.shape else { panic!("all rims are arcs") };
+            assert_eq!(number(&read["shape"]["radius"]), radius);
+        }
+        assert_eq!(json["faces"][1]["shape"]["kind"], "hole");
+        assert_eq!(json["faces"].as_array().unwrap().len(), 4);
     }
 }

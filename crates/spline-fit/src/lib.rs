@@ -15,6 +15,7 @@ mod analytic_face;
 pub mod basis;
 mod borders;
 mod cholesky;
+pub mod control_nets;
 mod edge_curve;
 mod energy;
 mod error;

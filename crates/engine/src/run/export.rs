@@ -127,10 +127,12 @@ fn write(
     let value = executor.obtain(export.stage)?;
     let fail = |error| Failure::from(CacheError::io("write", path, error));
     let temporary = Temporary::beside(path).map_err(fail)?;
-    let title = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    // The ending was found without regard to case; its dot comes before it.
+    let title = name.get(..name.len().saturating_sub(export.exporter.ending.len() + 1)).unwrap_or(&name);
     let mut file = HashingFile { file: BufWriter::new(temporary), hasher: blake3::Hasher::new(), bytes: 0 };
     let result =
-        std::panic::catch_unwind(AssertUnwindSafe(|| export.exporter.write(&value, &title, &mut file)));
+        std::panic::catch_unwind(AssertUnwindSafe(|| export.exporter.write(&value, title, &mut file)));
     match result {
         Ok(Ok(())) => {}
         Ok(Err(ExportError::Io(error))) => return Err(fail(error)),

@@ -45,9 +45,7 @@ pub(super) fn resolve(
             ));
         };
         let artifact = stages[stage].node.stage.output();
-        let ending =
-            Path::new(file).extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
-        let Some(exporter) = registry.exporter(&artifact, &ending) else {
+        let Some(exporter) = registry.exporter_of_file(&artifact, file) else {
             let what = with_article(artifact.name);
             let message = format!("{what} (stage `{target}`) cannot be written as `{file}`");
             let endings: Vec<String> =
