@@ -58,3 +58,13 @@ kills rounds="300":
 # Every class of files in a cache damaged at 1,000 random places.
 damage rounds="1000":
     TOPIPE_DAMAGES={{rounds}} cargo test -p topipe-engine --test it random_damage
+
+# Feed the readers of meshes, specs and artifacts with mangled files, so many times each.
+fuzz executions="10000000" seed="1":
+    ulimit -v 8000000; TOPIPE_FUZZ={{executions}} TOPIPE_FUZZ_SEED={{seed}} cargo test --release -p topipe --test fuzz
+
+# Time of a run with nothing to do, beside DVC and Snakemake.
+nothing-to-do:
+    cargo build --release
+    test -x target/peers/bin/dvc || (python3 -m venv target/peers && target/peers/bin/pip install -q dvc snakemake)
+    target/peers/bin/python benchmarks/nothing_to_do.py target/release/topipe

@@ -390,6 +390,10 @@ fn graphs_name_stages_and_exports() {
     assert!(mermaid.starts_with("flowchart LR\n") && mermaid.contains("s0 -->|mesh| s1"), "{mermaid}");
     let dot = shop.topipe(&["graph", "box.toml", "--format", "dot"]).stdout;
     assert!(dot.starts_with("digraph") && dot.contains("label = \"report.json\""), "{dot}");
+    let svg = shop.topipe(&["graph", "box.toml", "--format", "svg"]).stdout;
+    assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n"), "{svg}");
+    // Three stages and three exports, each with its box.
+    assert_eq!(svg.matches("rx=").count(), 6, "{svg}");
 }
 
 #[test]
@@ -591,6 +595,71 @@ fn runs_can_be_compared_pinned_and_thrown_away() {
     for wrong in [["--max-size", "big"], ["--max-age", "long"]] {
         assert_eq!(shop.topipe(&[&["cache", "gc"][..], &wrong].concat()).code, 2);
     }
+}
+
+#[test]
+fn a_recorded_run_is_reproduced_and_locked() {
+    let shop = Workshop::new();
+    shop.events(&["--out", "out", "--set", "smooth.lambda=0.5"]);
+    let ended = shop.topipe(&["reproduce", "out/run.json"]);
+    assert_eq!((ended.code, ended.stdout.as_str()), (0, "3 stages, 3 files: equal\n"), "{}", ended.stderr);
+    let ended = shop.topipe(&["lock", "out"]);
+    assert_eq!((ended.code, ended.stdout.ends_with("box.lock.json\n")), (0, true), "{}", ended.stderr);
+    let lock = shop.read("box.lock.json");
+    assert!(!lock.contains(shop.folder.path().to_str().unwrap()), "{lock}");
+    let ended = shop.topipe(&["reproduce", "box.lock.json", "--out", "again"]);
+    assert_eq!((ended.code, ended.stdout.as_str()), (0, "3 stages, 3 files: equal\n"), "{}", ended.stderr);
+    assert_eq!(shop.read("again/report.json"), shop.read("out/report.json"));
+    // Another result than was recorded.
+    let hash =
+        serde_json::from_str::<Value>(&lock).unwrap()["stages"][1]["artifact"].as_str().unwrap().to_owned();
+    shop.write("box.lock.json", &lock.replace(&hash, &"0".repeat(64)));
+    let ended = shop.topipe(&["reproduce", "box.lock.json"]);
+    assert_eq!(ended.code, 1);
+    assert!(ended.stdout.contains("not equal\nsmooth: another result"), "{}", ended.stdout);
+    // Another file.
+    shop.write("box.off", &box_off(5));
+    let ended = shop.topipe(&["reproduce", "out/run.json"]);
+    assert_eq!(ended.code, 3);
+    assert!(ended.stderr.contains("box.off (stage `mesh`) has the hash "), "{}", ended.stderr);
+}
+
+#[test]
+fn a_sweep_computes_shared_stages_once_and_makes_a_table() {
+    let shop = Workshop::new();
+    shop.write(
+        "box.toml",
+        &(PIPELINE.to_owned()
+            + "\n[sweep]\ngrid = { \"smooth.iterations\" = [0, 2], \"smooth.lambda\" = [0.4, 0.5] }\n\
+               figures = [\"check.smoothing.iterations\", \"check.original.triangles\"]\n"),
+    );
+    let ended = shop.topipe(&["run", "box.toml"]);
+    assert_eq!(ended.code, 0, "{}", ended.stderr);
+    let csv = shop.read("topipe-out/box/sweep.csv");
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(
+        lines[0],
+        "variant,smooth.iterations,smooth.lambda,check.smoothing.iterations,check.original.triangles"
+    );
+    assert_eq!(lines[1], "\"iterations=0,lambda=0.4\",0,0.4,0,432");
+    assert_eq!(lines[4], "\"iterations=2,lambda=0.5\",2,0.5,2,432");
+    assert_eq!(ended.stdout.matches("import").count(), 1, "{}", ended.stdout);
+    assert!(shop.path("topipe-out/box/iterations=2,lambda=0.5/report.json").is_file());
+    let events = shop.events(&[]);
+    assert!(events.iter().all(|event| !event.contains("started ") || event == "run-started "), "{events:#?}");
+}
+
+#[test]
+fn a_shared_folder_serves_as_a_second_cache() {
+    let shop = Workshop::new();
+    std::fs::create_dir(shop.path("shared")).unwrap();
+    shop.events(&["--cache", "one", "--remote", "shared"]);
+    assert_eq!(shop.events(&["--cache", "two", "--remote", "shared"])[1..4], NOTHING[1..4]);
+    let away = shop.topipe(&["run", "box.toml", "--cache", "three", "--remote", "away"]);
+    assert_eq!(away.code, 0);
+    assert!(away.stderr.contains("going on without the remote cache away"), "{}", away.stderr);
+    let wrong = shop.topipe(&["run", "box.toml", "--remote", "ftp://x"]);
+    assert_eq!(wrong.code, 2, "{}", wrong.stderr);
 }
 
 #[test]

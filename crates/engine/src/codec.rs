@@ -161,15 +161,20 @@ pub fn encode<T: Serialize>(value: &T, kind: &str, version: u32) -> Result<Vec<u
     let config = bincode::config::standard().with_fixed_int_encoding();
     let payload = bincode::serde::encode_to_vec(value, config)
         .map_err(|error| EncodeError::Serialize(error.to_string()))?;
+    Ok(frame(&payload, kind, version))
+}
+
+/// The file of a payload that is serialized already.
+pub fn frame(payload: &[u8], kind: &str, version: u32) -> Vec<u8> {
     let header = Header {
         kind: kind.to_owned(),
         version,
         payload_bytes: payload.len() as u64,
-        payload_hash: ContentHash::of(&payload),
+        payload_hash: ContentHash::of(payload),
     };
     let mut file = header.to_bytes();
-    file.extend_from_slice(&payload);
-    Ok(file)
+    file.extend_from_slice(payload);
+    file
 }
 
 /// The value in `file`, which must be of the given kind and version.
@@ -222,15 +227,7 @@ mod tests {
 
     /// A file whose payload is arbitrary but whose header matches it: what a forger would write.
     fn forged(payload: &[u8]) -> Vec<u8> {
-        let header = Header {
-            kind: "sample".into(),
-            version: 1,
-            payload_bytes: payload.len() as u64,
-            payload_hash: ContentHash::of(payload),
-        };
-        let mut file = header.to_bytes();
-        file.extend_from_slice(payload);
-        file
+        frame(payload, "sample", 1)
     }
 
     #[test]

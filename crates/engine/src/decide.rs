@@ -118,7 +118,8 @@ impl<'a> Decider<'a> {
             lease.hold(&[key]);
         }
         let record = self.cache.key_record(key, damages)?;
-        Ok(record.filter(|record| self.cache.has_artifact(record, damages)))
+        let here = record.filter(|record| self.cache.has_artifact(record, damages));
+        Ok(here.or_else(|| self.cache.fetch(key)))
     }
 
     /// The external files of a stage.

@@ -106,11 +106,13 @@ mod machine;
 mod plan;
 mod reason;
 mod registry;
+pub mod reproduce;
 mod run;
 mod schema;
 mod selection;
 mod spec;
 mod stage;
+mod sweep_table;
 
 pub use artifact::{ArtifactKind, ArtifactType, Value};
 pub use cache::{Cache, UnitCounts, UnitsAtHand};
@@ -133,7 +135,9 @@ pub use run::{
 pub use schema::{ParameterField, parameter_fields, pipeline_schema};
 pub use selection::Choice;
 pub use spec::{ExportNode, FileInput, Override, OverrideError, Pipeline, Place, SpecError, StageNode};
+pub use spec::{Figure, Sweep, Variant};
 pub use stage::{
     AnyStage, BadValue, FileField, InputPort, NeededUnits, ResolvedParameters, SourceFile, Stage,
-    StageContext, StageError, with_causes,
+    StageContext, StageError, stage_key, with_causes,
 };
+pub use sweep_table::SweepTable;

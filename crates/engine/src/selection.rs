@@ -33,7 +33,9 @@ impl Selection {
     pub(crate) fn new(pipeline: &Pipeline, choice: &Choice) -> Result<Self, Box<Diagnostic>> {
         let graph = &pipeline.graph;
         let indices = |option: &str, names: &[String]| {
-            names.iter().map(|name| find(pipeline, option, name)).collect::<Result<Vec<usize>, _>>()
+            let found =
+                names.iter().map(|name| find(pipeline, option, name)).collect::<Result<Vec<_>, _>>()?;
+            Ok::<_, Box<Diagnostic>>(found.concat())
         };
         let mut selected: BTreeSet<usize> = (0..pipeline.stages.len()).collect();
         let until = indices("--until", &choice.until)?;
@@ -49,8 +51,8 @@ impl Selection {
             selected = &selected & &only.into_iter().collect();
         }
         let forced = indices("--force", &choice.force)?;
-        for (&stage, name) in forced.iter().zip(&choice.force) {
-            if !selected.contains(&stage) {
+        for name in &choice.force {
+            if !pipeline.indices_of(name).iter().all(|stage| selected.contains(stage)) {
                 return Err(argument("--force", name, format!("stage `{name}` is not part of this run")));
             }
         }
@@ -59,11 +61,15 @@ impl Selection {
     }
 }
 
-fn find(pipeline: &Pipeline, option: &str, name: &str) -> Result<usize, Box<Diagnostic>> {
-    pipeline.index_of(name).ok_or_else(|| {
-        let known = pipeline.stages.iter().map(|stage| stage.name.as_str());
-        Box::new((*argument(option, name, format!("there is no stage `{name}`"))).suggest(name, known))
-    })
+fn find(pipeline: &Pipeline, option: &str, name: &str) -> Result<Vec<usize>, Box<Diagnostic>> {
+    let found = pipeline.indices_of(name);
+    if found.is_empty() {
+        let known = pipeline.stages.iter().map(|stage| stage.base.as_str());
+        return Err(Box::new(
+            (*argument(option, name, format!("there is no stage `{name}`"))).suggest(name, known),
+        ));
+    }
+    Ok(found)
 }
 
 fn argument(option: &str, name: &str, message: String) -> Box<Diagnostic> {

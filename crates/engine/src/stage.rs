@@ -363,6 +363,26 @@ fn typed<S: Stage>(parameters: &ResolvedParameters) -> Result<&S::Parameters, St
         .ok_or_else(|| StageError::Failed("the parameters belong to another kind of stage".into()))
 }
 
+/// The key of a run of `stage`: equal for equal work, whatever the paths, the time, the machine and the number of
+/// threads. `inputs` are the content hashes at the connected ports, `files` the ending of each file's name, which
+/// selects its reader, and the hash of its content.
+pub fn stage_key(
+    stage: &dyn AnyStage,
+    parameters: &ResolvedParameters,
+    inputs: &BTreeMap<&'static str, ContentHash>,
+    files: &BTreeMap<String, (String, ContentHash)>,
+) -> ContentHash {
+    KeyParts {
+        kind: stage.kind(),
+        code_version: &stage.code_version(),
+        output: stage.output(),
+        parameters,
+        inputs,
+        files,
+    }
+    .key()
+}
+
 /// Everything the key of a stage run is made of.
 pub(crate) struct KeyParts<'a> {
     pub(crate) kind: &'a str,

@@ -66,6 +66,10 @@ pub enum Command {
     Inspect(InspectArguments),
     /// Draw a mesh file, an artifact file, or the result of a stage as PNG.
     Render(RenderArguments),
+    /// Do a recorded run once more, from nothing, and say whether it gives the same.
+    Reproduce(ReproduceArguments),
+    /// Write the hashes of a run to a file that can be kept beside a paper; `reproduce` takes it too.
+    Lock(LockArguments),
     /// Say what differs between two runs: parameters, inputs, code, results.
     Diff(DiffArguments),
     /// Say again what the stages of a pipeline said when their results were computed.
@@ -89,6 +93,12 @@ pub struct PipelineArguments {
     /// The cache [default: .topipe beside the pipeline].
     #[arg(long, env = "TOPIPE_CACHE", value_name = "DIR")]
     pub cache: Option<PathBuf>,
+    /// A second cache behind the first: a shared folder, or s3://BUCKET/PREFIX.
+    #[arg(long, env = "TOPIPE_REMOTE", value_name = "DIR|URL")]
+    pub remote: Option<String>,
+    /// Take from the remote cache, give nothing to it.
+    #[arg(long, env = "TOPIPE_REMOTE_READ_ONLY", requires = "remote")]
+    pub remote_read_only: bool,
     /// Use another value than the pipeline says.
     #[arg(long = "set", value_name = "STAGE.FIELD=VALUE")]
     pub set: Vec<Override>,
@@ -96,7 +106,7 @@ pub struct PipelineArguments {
 
 impl PipelineArguments {
     /// The cache folder.
-    pub fn cache(&self) -> PathBuf {
+    pub fn cache_folder(&self) -> PathBuf {
         let beside = || self.pipeline.parent().unwrap_or(Path::new("")).join(".topipe");
         self.cache.clone().unwrap_or_else(beside)
     }
@@ -193,6 +203,8 @@ pub enum GraphFormat {
     Mermaid,
     /// Graphviz.
     Dot,
+    /// A picture.
+    Svg,
 }
 
 /// `topipe graph`.
@@ -327,6 +339,29 @@ pub struct DiffArguments {
     /// The differences as one JSON object.
     #[arg(long)]
     pub json: bool,
+}
+
+/// `topipe reproduce`.
+#[derive(Debug, Args)]
+pub struct ReproduceArguments {
+    /// The record: a run.json or a lock file.
+    pub record: PathBuf,
+    /// The folder for the exports [default: they are compared and thrown away].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// An empty folder to compute in, which is kept [default: a temporary one].
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+}
+
+/// `topipe lock`.
+#[derive(Debug, Args)]
+pub struct LockArguments {
+    /// The run: its run.json or its output folder.
+    pub run: PathBuf,
+    /// The lock file [default: beside the pipeline, NAME.lock.json].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
 }
 
 /// `topipe log`.

@@ -52,13 +52,23 @@ pub(crate) struct Console {
     verbosity: Verbosity,
     bars: MultiProgress,
     running: Mutex<HashMap<String, ProgressBar>>,
+    /// How many stages are done, where there are many.
+    whole: Mutex<Option<ProgressBar>>,
 }
+
+/// So many stages can be followed one by one.
+const FEW: usize = 12;
 
 impl Console {
     pub(crate) fn new(verbosity: Verbosity, bars: bool) -> Self {
         let show = bars && verbosity > Verbosity::Quiet && std::io::stderr().is_terminal();
         let target = if show { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        Self { verbosity, bars: MultiProgress::with_draw_target(target), running: Mutex::default() }
+        Self {
+            verbosity,
+            bars: MultiProgress::with_draw_target(target),
+            running: Mutex::default(),
+            whole: Mutex::default(),
+        }
     }
 
     /// Takes the bars away.
@@ -93,7 +103,23 @@ impl Console {
 
 impl EventSink for Console {
     fn event(&self, event: &Event) {
+        if let Event::StageCached { .. }
+        | Event::StageFinished { .. }
+        | Event::StageFailed { .. }
+        | Event::StageSkipped { .. } = event
+            && let Some(bar) = &*self.whole.lock().unwrap_or_else(PoisonError::into_inner)
+        {
+            bar.inc(1);
+        }
         match event {
+            Event::RunStarted { stages, .. } if stages.len() > FEW => {
+                let bar = self.bars.insert(0, ProgressBar::new(stages.len() as u64));
+                if let Ok(style) = ProgressStyle::with_template("  {bar:40} {pos} of {len} stages {elapsed}")
+                {
+                    bar.set_style(style);
+                }
+                *self.whole.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar);
+            }
             Event::StageStarted { stage, reasons, .. } => {
                 let reasons: Vec<String> = reasons.iter().map(ToString::to_string).collect();
                 self.line(Verbosity::Verbose, &format!("{stage}: {}", reasons.join("; ")));

@@ -9,11 +9,15 @@ mod commands;
 mod display;
 mod export;
 mod failure;
+#[cfg(feature = "s3")]
+mod object_store;
 mod picture;
+mod remote;
 pub mod stages;
 
 use args::{Arguments, Command};
 use clap::Parser;
+use std::panic::AssertUnwindSafe;
 use std::process::ExitCode;
 
 /// Parses the command line and does what it says.
@@ -22,11 +26,20 @@ pub fn main() -> ExitCode {
     start_logging(&arguments);
     // The engine turns a panic inside of a stage into a failure of that stage; a trace would only hide the message.
     std::panic::set_hook(Box::new(|info| tracing::debug!("{info}")));
-    match run(&arguments) {
-        Ok(code) => ExitCode::from(code.number()),
-        Err(failure) => {
+    match std::panic::catch_unwind(AssertUnwindSafe(|| run(&arguments))) {
+        Ok(Ok(code)) => ExitCode::from(code.number()),
+        Ok(Err(failure)) => {
             failure.print();
             ExitCode::from(failure.code().number())
+        }
+        Err(payload) => {
+            let text = payload
+                .downcast_ref::<&str>()
+                .map(|text| (*text).to_owned())
+                .or_else(|| payload.downcast_ref::<String>().cloned())
+                .unwrap_or_default();
+            eprintln!("error: topipe panicked, which is a defect of it: {text}");
+            ExitCode::from(topipe_engine::ExitCode::StageFailed.number())
         }
     }
 }
@@ -41,6 +54,8 @@ fn run(arguments: &Arguments) -> Result<topipe_engine::ExitCode, failure::Failur
         Command::Schema => commands::schema::run(),
         Command::Inspect(inspect) => commands::inspect::run(inspect),
         Command::Render(render) => commands::render::run(render),
+        Command::Reproduce(reproduce) => commands::reproduce::run(reproduce, verbosity),
+        Command::Lock(lock) => commands::reproduce::write_lock(lock),
         Command::Diff(diff) => commands::diff::run(diff),
         Command::Log(log) => commands::log::run(log),
         Command::Cache(cache) => commands::cache::run(cache),

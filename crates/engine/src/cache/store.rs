@@ -1,5 +1,6 @@
 //! Reading and writing the cache.
 
+use super::remote::RemoteCache;
 use super::{Bucket, Durability, KeyLock, Lease, LockError, Temporary, seal, unseal};
 use crate::artifact::{ArtifactType, Value};
 use crate::codec;
@@ -8,6 +9,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 /// The cache, or a file beside it, could not be read or written.
@@ -90,12 +92,13 @@ pub struct Usage {
 #[derive(Debug, Clone)]
 pub struct Cache {
     root: PathBuf,
+    pub(super) remote: Option<Arc<RemoteCache>>,
 }
 
 impl Cache {
     /// The cache in `root`, which is made on the first write.
     pub fn new(root: impl Into<PathBuf>) -> Self {
-        Self { root: root.into() }
+        Self { root: root.into(), remote: None }
     }
 
     /// The folder.
@@ -158,7 +161,7 @@ impl Cache {
     }
 
     /// Writes a file of the cache so that it appears in one step.
-    fn write(&self, path: &Path, bytes: &[u8], durability: Durability) -> Result<(), CacheError> {
+    pub(super) fn write(&self, path: &Path, bytes: &[u8], durability: Durability) -> Result<(), CacheError> {
         let write = || {
             let mut file = Temporary::new(&self.root.join(Bucket::Temporary.folder()))?;
             file.write_all(bytes)?;

@@ -14,6 +14,7 @@ use crate::interrupt::Interrupt;
 use crate::machine;
 use crate::reason::Reason;
 use crate::spec::StageNode;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// What is known about a stage so far.
@@ -292,11 +293,23 @@ impl<'a> Executor<'a> {
         }
     }
 
-    pub(super) fn into_records(self) -> Vec<StageRecord> {
-        self.order.iter().map(|&stage| self.record(stage)).collect()
+    /// A path as it is recorded: relative to the spec if the file is below it or was named so, otherwise absolute.
+    fn recorded_path(&self, path: &Path) -> PathBuf {
+        let folder = self.pipeline().path.parent().unwrap_or(Path::new(""));
+        match path.strip_prefix(folder) {
+            Ok(relative) => relative.to_owned(),
+            Err(_) => std::path::absolute(path).unwrap_or_else(|_| path.to_owned()),
+        }
     }
 
-    fn record(&self, stage: usize) -> StageRecord {
+    pub(super) fn into_records(self) -> Vec<StageRecord> {
+        // The slots are emptied one by one, and later stages name the artifacts of earlier ones.
+        let artifacts: Vec<Option<ContentHash>> =
+            (0..self.slots.len()).map(|stage| self.artifact(stage)).collect();
+        self.order.iter().map(|&stage| self.record(stage, &artifacts)).collect()
+    }
+
+    fn record(&self, stage: usize, artifacts: &[Option<ContentHash>]) -> StageRecord {
         let node = self.node(stage);
         let inputs = node
             .inputs
@@ -304,7 +317,7 @@ impl<'a> Executor<'a> {
             .map(|(&port, &from)| {
                 (
                     port.to_owned(),
-                    InputRecord { stage: self.node(from).name.clone(), artifact: self.artifact(from) },
+                    InputRecord { stage: self.node(from).name.clone(), artifact: artifacts[from] },
                 )
             })
             .collect();
@@ -313,7 +326,7 @@ impl<'a> Executor<'a> {
             .files(stage)
             .iter()
             .map(|(field, (_, hash))| {
-                (field.clone(), FileRecord { path: node.files[field].path.clone(), hash: *hash })
+                (field.clone(), FileRecord { path: self.recorded_path(&node.files[field].path), hash: *hash })
             })
             .collect();
         let slot = std::mem::take(&mut *lock(&self.slots[stage]));

@@ -97,6 +97,7 @@ impl Executor<'_> {
             tracing::warn!("stage `{}` gave another result than before from the same input", node.name);
         }
         self.cache().publish(&record)?;
+        self.cache().share(&record);
         Ok(Settled::Produced(Produced { value, record, units }))
     }
 

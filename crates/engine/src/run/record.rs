@@ -37,7 +37,7 @@ pub struct RunRecord {
 }
 
 /// Where a run took place.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Machine {
     /// Its name.
     pub host: String,
@@ -138,7 +138,7 @@ pub struct InputRecord {
 /// A file a stage reads.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileRecord {
-    /// Where it is.
+    /// Where it is, relative to the spec if it can be.
     pub path: PathBuf,
     /// The hash of its content.
     pub hash: ContentHash,

@@ -5,11 +5,13 @@ mod exports;
 mod overrides;
 mod parameters;
 mod stages;
+mod sweep;
 
 pub(crate) use exports::RUN_RECORD;
 pub(crate) use stages::PlacedStage;
 
 pub use overrides::{Override, OverrideError};
+pub use sweep::{Figure, Sweep, Variant};
 
 use crate::diagnostic::{Diagnostic, Source};
 use crate::graph::{self, StageGraph};
@@ -48,8 +50,10 @@ pub struct FileInput {
 /// A stage of a checked pipeline.
 #[derive(Clone)]
 pub struct StageNode {
-    /// Its name in the spec.
+    /// Its name: that in the spec, and for a variant of a sweep the values that make it.
     pub name: String,
+    /// Its name in the spec.
+    pub base: String,
     /// What it does.
     pub stage: Arc<dyn AnyStage>,
     /// Port name and the index of the stage connected to it.
@@ -86,6 +90,8 @@ pub struct Pipeline {
     pub exports: Vec<ExportNode>,
     /// Who depends on whom.
     pub graph: StageGraph,
+    /// The variants, if it is a sweep.
+    pub sweep: Option<Sweep>,
 }
 
 impl std::fmt::Debug for Pipeline {
@@ -134,14 +140,41 @@ impl Pipeline {
         let root = DeTable::parse(&source.text).map_err(|error| from_toml(&source, &error))?.into_inner();
         let text_overrides: Vec<overrides::Sourced> = overrides.iter().map(Override::sourced).collect();
         let top = top_level(&source, &root)?;
-        let stages = stages::resolve(&source, path, top.stages, &text_overrides, registry)?;
+        let resolve = |overrides: &[overrides::Sourced]| {
+            stages::resolve(&source, path, top.stages, overrides, registry)
+        };
+        let export = |stages: &[PlacedStage]| exports::resolve(&source, top.exports, stages, registry);
+        let (stages, exports, sweep) = match top.sweep {
+            None => {
+                let stages = resolve(&text_overrides)?;
+                let exports = export(&stages)?;
+                (stages, exports, None)
+            }
+            Some(table) => {
+                let (drafts, figures) = sweep::read(&source, table)?;
+                // What the command line says has the last word.
+                let all = |draft: &sweep::Draft| {
+                    resolve(&draft.overrides().chain(&text_overrides).cloned().collect::<Vec<_>>())
+                };
+                let merged = sweep::merge(&drafts, all, export)?;
+                sweep::check_figures(&source, table, &figures, &merged)?;
+                (merged.stages, merged.exports, Some(Sweep { variants: merged.variants, figures }))
+            }
+        };
         let graph = graph::build(&stages)?;
-        let exports = exports::resolve(&source, top.exports, &stages, registry)?;
         let stem =
             path.file_stem().map_or_else(|| "pipeline".into(), |stem| stem.to_string_lossy().into_owned());
         let name = top.name.unwrap_or(stem);
         let stages = stages.into_iter().map(|stage| stage.node).collect();
-        Ok(Self { name, path: path.to_owned(), stages, exports, graph })
+        Ok(Self { name, path: path.to_owned(), stages, exports, graph, sweep })
+    }
+
+    /// The stages of this name: one, or for a name in the spec of a sweep all its variants.
+    pub fn indices_of(&self, name: &str) -> Vec<usize> {
+        let exact: Vec<usize> = self.index_of(name).into_iter().collect();
+        let of_base = || (0..self.stages.len()).filter(|&stage| self.stages[stage].base == name).collect();
+        // The plain name may be that of a stage whose variants carry more.
+        if exact.iter().any(|&stage| self.stages[stage].base != name) { exact } else { of_base() }
     }
 
     /// The index of the stage of this name.
@@ -155,10 +188,11 @@ struct TopLevel<'t, 's> {
     name: Option<String>,
     stages: Option<&'t Spanned<DeValue<'s>>>,
     exports: Option<&'t Spanned<DeValue<'s>>>,
+    sweep: Option<&'t Spanned<DeValue<'s>>>,
 }
 
 fn top_level<'t, 's>(source: &Arc<Source>, root: &'t DeTable<'s>) -> Checked<TopLevel<'t, 's>> {
-    let mut top = TopLevel { name: None, stages: None, exports: None };
+    let mut top = TopLevel { name: None, stages: None, exports: None, sweep: None };
     for (key, value) in root.iter() {
         match key.get_ref().as_ref() {
             "name" => {
@@ -177,10 +211,11 @@ fn top_level<'t, 's>(source: &Arc<Source>, root: &'t DeTable<'s>) -> Checked<Top
             }
             "stage" => top.stages = Some(value),
             "export" => top.exports = Some(value),
+            "sweep" => top.sweep = Some(value),
             other => {
                 return Err(Box::new(
                     Diagnostic::new(source, key.span(), format!("unknown field `{other}`"))
-                        .suggest(other, ["name", "stage", "export"]),
+                        .suggest(other, ["name", "stage", "export", "sweep"]),
                 ));
             }
         }

@@ -1,6 +1,7 @@
 //! `--set STAGE.FIELD=VALUE`.
 
 use crate::diagnostic::Source;
+use std::ops::Range;
 use std::str::FromStr;
 use std::sync::Arc;
 use toml::Spanned;
@@ -48,7 +49,10 @@ impl FromStr for Override {
 pub(super) struct Sourced {
     pub(super) stage: String,
     pub(super) source: Arc<Source>,
-    /// The same text with the argument's front blanked out: TOML, in which everything keeps its place.
+    /// Whether it stands in the spec, so that paths are relative to that.
+    pub(super) in_spec: bool,
+    stage_span: Range<usize>,
+    /// The same text with all but the field and its value blanked out: TOML, in which everything keeps its place.
     toml: String,
 }
 
@@ -67,7 +71,9 @@ impl Override {
             (text, toml) = with(&quoted);
         }
         let source = Arc::new(Source { name: "command line".into(), text });
-        Sourced { stage: self.stage.clone(), source, toml }
+        let start = "--set ".len();
+        let stage_span = start..start + self.stage.len();
+        Sourced { stage: self.stage.clone(), source, in_spec: false, stage_span, toml }
     }
 }
 
@@ -79,9 +85,26 @@ impl Sourced {
     }
 
     /// The span of the stage's name in the text.
-    pub(super) fn stage_span(&self) -> std::ops::Range<usize> {
-        let start = "--set ".len();
-        start..start + self.stage.len()
+    pub(super) fn stage_span(&self) -> Range<usize> {
+        self.stage_span.clone()
+    }
+
+    /// A field and its value as they stand apart from each other in a spec, each with its place.
+    pub(super) fn in_spec(
+        stage: &str,
+        stage_span: Range<usize>,
+        source: &Arc<Source>,
+        (field, field_at): (&str, usize),
+        (value, value_at): (&str, usize),
+    ) -> Self {
+        let mut toml = " ".repeat(field_at);
+        toml.push_str(field);
+        toml.push('=');
+        // A field whose parts stand wide apart in the spec may seem to end behind the value's place; then only the
+        // caret of a message is off.
+        toml.push_str(&" ".repeat(value_at.saturating_sub(toml.len())));
+        toml.push_str(value);
+        Self { stage: stage.to_owned(), source: Arc::clone(source), in_spec: true, stage_span, toml }
     }
 }
 

@@ -133,7 +133,9 @@ fn one(
                 }
                 // A path on the command line is relative to where the command is given.
                 Role::File(field, text) => {
-                    files.insert(field.to_owned(), FileInput { path: text.into(), place });
+                    let base =
+                        if over.in_spec { path.parent().unwrap_or(Path::new("")) } else { Path::new("") };
+                    files.insert(field.to_owned(), FileInput { path: base.join(text), place });
                 }
                 Role::Parameter => parameter_overrides.push((*over, entries.clone())),
             }
@@ -144,6 +146,7 @@ fn one(
     let set_here: Vec<String> = given
         .overrides
         .iter()
+        .filter(|(over, _)| !over.in_spec)
         .flat_map(|(_, entries)| entries.keys().map(|key| key.get_ref().clone().into_owned()))
         .collect();
     let parameters = parameters::resolve(stage.as_ref(), name, &section.place, given)?;
@@ -158,6 +161,7 @@ fn one(
     }
     let node = StageNode {
         name: name.to_owned(),
+        base: name.to_owned(),
         stage: Arc::clone(stage),
         inputs: BTreeMap::new(),
         files,

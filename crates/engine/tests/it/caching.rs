@@ -197,5 +197,7 @@ fn the_record_of_a_run_tells_what_a_cached_stage_once_said() {
     assert_eq!(written["stages"][1]["outcome"], "cached");
     assert_eq!(written["stages"][1]["parameters"]["suffix"], ".");
     assert_eq!(written["stages"][2]["inputs"]["input"]["stage"], "soft");
+    assert_eq!(written["stages"][2]["inputs"]["input"]["artifact"], written["stages"][1]["artifact"]);
+    assert!(written["stages"][1]["artifact"].is_string());
     assert_eq!(written["exit_code"], 0);
 }

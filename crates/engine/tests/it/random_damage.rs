@@ -162,9 +162,7 @@ fn artifacts_that_lie_allocate_nothing_silly() {
     let shop = shop();
     let (record, _) = shop.run();
     // The text artifact of `loud` with a payload whose inner length is 2^62, sealed with right hashes.
-    let payload = (1u64 << 62).to_le_bytes().to_vec();
-    let file =
-        topipe_engine::codec::encode(&u64::from_le_bytes(payload.try_into().unwrap()), "text", 1).unwrap();
+    let file = topipe_engine::codec::frame(&(1u64 << 62).to_le_bytes(), "text", 1);
     let forged = topipe_engine::codec::open(&file).unwrap().0.identity();
     let path = shop.cache().path(Bucket::Artifacts, forged);
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();

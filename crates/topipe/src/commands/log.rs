@@ -5,11 +5,11 @@ use crate::display;
 use crate::failure::Failure;
 use crate::stages::registry;
 use std::fmt::Write;
-use topipe_engine::{Action, Cache, Choice, ExitCode, Pipeline, plan};
+use topipe_engine::{Action, Choice, ExitCode, Pipeline, plan};
 
 pub(crate) fn run(arguments: &LogArguments) -> Result<ExitCode, Failure> {
     let pipeline = Pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry())?;
-    let cache = Cache::new(arguments.pipeline.cache());
+    let cache = crate::remote::cache(&arguments.pipeline)?;
     let choice = Choice { until: arguments.stage.iter().cloned().collect(), ..Choice::default() };
     let plan = plan(&pipeline, &cache, &choice)?;
     let mut text = String::new();

@@ -4,11 +4,11 @@ use crate::args::PlanArguments;
 use crate::failure::Failure;
 use crate::stages::registry;
 use std::fmt::Write;
-use topipe_engine::{Action, Cache, ExitCode, Pipeline, Plan, PlannedUnits, UnitsAtHand, plan};
+use topipe_engine::{Action, ExitCode, Pipeline, Plan, PlannedUnits, UnitsAtHand, plan};
 
 pub(crate) fn run(arguments: &PlanArguments) -> Result<ExitCode, Failure> {
     let pipeline = Pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry())?;
-    let cache = Cache::new(arguments.pipeline.cache());
+    let cache = crate::remote::cache(&arguments.pipeline)?;
     let plan = plan(&pipeline, &cache, &arguments.choice.choice())?;
     for damage in &plan.damages {
         tracing::warn!("{}: {}; moved aside", damage.path.display(), damage.reason);

@@ -7,8 +7,9 @@ use crate::failure::Failure;
 use crate::stages::registry;
 use std::sync::Arc;
 use std::time::Duration;
+use topipe_engine::cache::write_atomically;
 use topipe_engine::{
-    ArtifactKind, ArtifactType, Cache, EventSink, ExitCode, Interrupt, Pipeline, RunRecord,
+    ArtifactKind, ArtifactType, Cache, EventSink, ExitCode, Interrupt, Pipeline, RunRecord, SweepTable,
     run as run_pipeline,
 };
 
@@ -20,7 +21,7 @@ pub(crate) fn run(arguments: &RunArguments, verbosity: Verbosity) -> Result<Exit
         // Fails only if the pool exists already, which it does not yet.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(jobs)).build_global();
     }
-    let cache = Cache::new(arguments.pipeline.cache());
+    let cache = crate::remote::cache(&arguments.pipeline)?;
     let interrupt = stop_on_signal();
     let console = Arc::new(Console::new(verbosity, !arguments.json));
     let sink: Arc<dyn EventSink> = if arguments.json {
@@ -30,8 +31,16 @@ pub(crate) fn run(arguments: &RunArguments, verbosity: Verbosity) -> Result<Exit
     };
     let record = run_pipeline(&pipeline, &cache, &options, &interrupt, sink)?;
     console.finish();
+    let table = SweepTable::new(&pipeline, &record, &cache, USUAL_FIGURES);
+    if let Some(table) = &table {
+        write_atomically(&options.out.join("sweep.csv"), table.csv().as_bytes())?;
+    }
     if !arguments.json && verbosity > Verbosity::Quiet {
-        super::print(&display::summary(&record, &options.out, &figures(&record, &cache)))?;
+        let figures = match table {
+            Some(table) => vec![("sweep.csv".to_owned(), table.text())],
+            None => figures(&record, &cache),
+        };
+        super::print(&display::summary(&record, &options.out, &figures))?;
     }
     Ok(record.code)
 }
@@ -41,7 +50,7 @@ const PATIENCE: Duration = Duration::from_millis(900);
 
 /// The first signal asks the run to stop, the second ends the process. A run that does not stop in time is ended as
 /// well: whatever moment that is, the cache is whole, and the next run removes what is left half done.
-fn stop_on_signal() -> Interrupt {
+pub(super) fn stop_on_signal() -> Interrupt {
     let interrupt = Interrupt::new();
     let raised = interrupt.clone();
     let end = || std::process::exit(i32::from(ExitCode::Interrupted.number()));
@@ -61,6 +70,19 @@ fn stop_on_signal() -> Interrupt {
     }
     interrupt
 }
+
+/// The columns of a sweep's table where its spec names none.
+const USUAL_FIGURES: &[(&str, &str)] = &[
+    (Report::NAME, "smoothing.iterations"),
+    (Report::NAME, "smoothing.deviation.max_rel"),
+    (Report::NAME, "layout.quads"),
+    (Report::NAME, "layout.min_scaled_jacobian"),
+    (Report::NAME, "surface.patches"),
+    (Report::NAME, "surface.deviation.mean_rel"),
+    (Report::NAME, "surface.deviation.max_rel"),
+    (Report::NAME, "surface.volume_error"),
+    (Report::NAME, "skeleton.e_center"),
+];
 
 /// The main figures of each report of the run.
 fn figures(record: &RunRecord, cache: &Cache) -> Vec<(String, String)> {

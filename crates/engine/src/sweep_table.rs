@@ -1,0 +1,154 @@
+//! What came of the variants of a sweep, as one table.
+
+use crate::cache::Cache;
+use crate::run::RunRecord;
+use crate::spec::{Figure, Pipeline, Sweep};
+use serde_json::Value;
+use std::collections::HashMap;
+
+/// One row for each variant: its name, the values of the swept fields, and figures of its results.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SweepTable {
+    /// Names of the columns.
+    pub header: Vec<String>,
+    /// The rows in the order of the variants.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl SweepTable {
+    /// The table of a run. Where the spec names no figures, `usual` are looked for in all results of their kind
+    /// (kind of artifact and path), and those that are there make the columns. What a failed stage has no figures for
+    /// stays empty.
+    pub fn new(
+        pipeline: &Pipeline,
+        record: &RunRecord,
+        cache: &Cache,
+        usual: &[(&str, &str)],
+    ) -> Option<Self> {
+        let sweep = pipeline.sweep.as_ref()?;
+        let mut results = Results { pipeline, record, cache, known: HashMap::new() };
+        let mut figures = sweep.figures.clone();
+        let named = !figures.is_empty();
+        if !named {
+            figures = usual_figures(pipeline, sweep, usual);
+        }
+        let mut fields: Vec<&String> = Vec::new();
+        for (field, _) in sweep.variants.iter().flat_map(|variant| &variant.values) {
+            if !fields.contains(&field) {
+                fields.push(field);
+            }
+        }
+        let columns: Vec<Vec<String>> = figures
+            .iter()
+            .map(|figure| {
+                let of = |variant: &crate::spec::Variant| {
+                    let stage = variant.stages.iter().find(|(name, _)| *name == figure.stage)?.1;
+                    plain(results.of(stage)?, &figure.path)
+                };
+                sweep.variants.iter().map(of).map(Option::unwrap_or_default).collect()
+            })
+            .collect();
+        let wanted: Vec<usize> =
+            (0..figures.len()).filter(|&k| named || columns[k].iter().any(|cell| !cell.is_empty())).collect();
+        let mut header = vec!["variant".to_owned()];
+        header.extend(fields.iter().map(|field| (*field).clone()));
+        header.extend(wanted.iter().map(|&k| format!("{}.{}", figures[k].stage, figures[k].path.join("."))));
+        let rows = sweep
+            .variants
+            .iter()
+            .enumerate()
+            .map(|(row, variant)| {
+                let value = |field: &&String| {
+                    variant.values.iter().find(|(name, _)| name == *field).map(|(_, value)| value.clone())
+                };
+                let mut cells = vec![variant.name.clone()];
+                cells.extend(fields.iter().map(value).map(Option::unwrap_or_default));
+                cells.extend(wanted.iter().map(|&k| columns[k][row].clone()));
+                cells
+            })
+            .collect();
+        Some(Self { header, rows })
+    }
+
+    /// As CSV (RFC 4180, with line feeds).
+    pub fn csv(&self) -> String {
+        let quoted = |cell: &String| {
+            if cell.contains([',', '"', '\n', '\r']) {
+                format!("\"{}\"", cell.replace('"', "\"\""))
+            } else {
+                cell.clone()
+            }
+        };
+        let line = |cells: &Vec<String>| cells.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n";
+        std::iter::once(&self.header).chain(&self.rows).map(line).collect()
+    }
+
+    /// For people, in columns.
+    pub fn text(&self) -> String {
+        let width = |column: usize| {
+            let all = std::iter::once(&self.header).chain(&self.rows);
+            all.map(|cells| cells[column].chars().count()).max().unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..self.header.len()).map(width).collect();
+        let line = |cells: &Vec<String>| {
+            let padded: Vec<String> =
+                cells.iter().zip(&widths).map(|(cell, width)| format!("{cell:width$}")).collect();
+            format!("{}\n", padded.join("  ").trim_end())
+        };
+        std::iter::once(&self.header).chain(&self.rows).map(line).collect()
+    }
+}
+
+fn usual_figures(pipeline: &Pipeline, sweep: &Sweep, usual: &[(&str, &str)]) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    for (name, stage) in sweep.variants.iter().flat_map(|variant| &variant.stages) {
+        for (kind, path) in usual {
+            let path: Vec<String> = path.split('.').map(str::to_owned).collect();
+            let figure = Figure { stage: name.clone(), path };
+            if pipeline.stages[*stage].stage.output().name == *kind && !figures.contains(&figure) {
+                figures.push(figure);
+            }
+        }
+    }
+    figures
+}
+
+/// Results as JSON, each loaded once.
+struct Results<'a> {
+    pipeline: &'a Pipeline,
+    record: &'a RunRecord,
+    cache: &'a Cache,
+    known: HashMap<usize, Option<Value>>,
+}
+
+impl Results<'_> {
+    fn of(&mut self, stage: usize) -> Option<&Value> {
+        let (pipeline, record, cache) = (self.pipeline, self.record, self.cache);
+        let load = || {
+            let node = &pipeline.stages[stage];
+            let artifact = record.stages.iter().find(|record| record.stage == node.name)?.artifact?;
+            // What cannot be read now is told of by the next run.
+            let value = cache.load(&node.stage.output(), artifact, &mut Vec::new()).ok()??;
+            node.stage.output().to_json(&value)
+        };
+        self.known.entry(stage).or_insert_with(load).as_ref()
+    }
+}
+
+/// The value at a path: a number or a word as it is, a list as its length.
+fn plain(value: &Value, path: &[String]) -> Option<String> {
+    let mut at = value;
+    for part in path {
+        at = match at {
+            Value::Object(fields) => fields.get(part)?,
+            Value::Array(items) => items.get(part.parse::<usize>().ok()?)?,
+            _ => return None,
+        };
+    }
+    match at {
+        Value::String(text) => Some(text.clone()),
+        Value::Array(items) => Some(items.len().to_string()),
+        Value::Null | Value::Object(_) => None,
+        other => Some(other.to_string()),
+    }
+}

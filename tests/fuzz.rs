@@ -1,0 +1,320 @@
+//! Readers of foreign bytes fed with what nobody would write: no panic, no hang, no absurd allocation.
+//!
+//! A deterministic mutation fuzzer: inputs start from the corpus (fixtures/zoo, tests/corpus and small files made here),
+//! are mangled by bytes, numbers, words and pieces of each other, and are read. An input that made trouble is written to
+//! `target/fuzz` before anything else is done with it, and belongs into `tests/corpus/TARGET` once it is understood.
+//!
+//! Each target runs some thousand times with all other tests, and as often as wanted by
+//! `just fuzz 10000000` (`TOPIPE_FUZZ=10000000`), which also varies with `TOPIPE_FUZZ_SEED`.
+
+use std::panic::AssertUnwindSafe;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use topipe_engine::{ArtifactKind, Pipeline, codec};
+
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        // splitmix64 (Steele, Lea, Flood 2014).
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, limit: usize) -> usize {
+        (self.next() % limit.max(1) as u64) as usize
+    }
+}
+
+/// Numbers and words on which readers stumble.
+const WORDS: [&[u8]; 34] = [
+    b"0",
+    b"-1",
+    b"1",
+    b"4294967295",
+    b"4294967296",
+    b"18446744073709551615",
+    b"-9223372036854775808",
+    b"1e308",
+    b"1e999",
+    b"-1e-320",
+    b"nan",
+    b"inf",
+    b"-inf",
+    b"0x10",
+    b"\n",
+    b"\r\n",
+    b" ",
+    b"\t",
+    b"#",
+    b"\"",
+    b"'",
+    b"[",
+    b"]",
+    b"{",
+    b"}",
+    b"=",
+    b".",
+    b"/",
+    b"\\",
+    b"\0",
+    b"\xff",
+    b"\xef\xbb\xbf",
+    b"facet normal",
+    b"element vertex 4000000000",
+];
+
+fn mutate(random: &mut Random, seeds: &[Vec<u8>]) -> Vec<u8> {
+    let mut bytes = seeds[random.below(seeds.len())].clone();
+    for _ in 0..=random.below(4) {
+        let at = random.below(bytes.len() + 1);
+        match random.below(9) {
+            0 if at < bytes.len() => bytes[at] ^= 1 << random.below(8),
+            1 if at < bytes.len() => bytes[at] = random.next() as u8,
+            2 => bytes.truncate(at),
+            3 => {
+                let end = (at + 1 + random.below(16)).min(bytes.len());
+                bytes.drain(at.min(end)..end);
+            }
+            4 => {
+                let word = WORDS[random.below(WORDS.len())];
+                bytes.splice(at..at, word.iter().copied());
+            }
+            5 => {
+                // A word in place of another.
+                let word = WORDS[random.below(WORDS.len())];
+                let end =
+                    bytes[at..].iter().position(u8::is_ascii_whitespace).map_or(bytes.len(), |n| at + n);
+                bytes.splice(at..end, word.iter().copied());
+            }
+            6 => {
+                // Extreme numbers in binary files.
+                let value =
+                    [0u64, 1, 0xFF, 0x7FFF_FFFF, 0xFFFF_FFFF, u64::MAX, 1 << 40, 0x7FF0_0000_0000_0000];
+                let number = value[random.below(value.len())].to_le_bytes();
+                let length = [1, 2, 4, 8][random.below(4)];
+                let end = (at + length).min(bytes.len());
+                bytes[at..end].copy_from_slice(&number[..end - at]);
+            }
+            7 => {
+                let other = &seeds[random.below(seeds.len())];
+                let from = random.below(other.len() + 1);
+                let to = (from + random.below(200)).min(other.len());
+                bytes.splice(at..at, other[from..to].iter().copied());
+            }
+            _ => {
+                let end = (at + random.below(200)).min(bytes.len());
+                let piece = bytes[at..end].to_vec();
+                bytes.splice(at..at, piece);
+            }
+        }
+        bytes.truncate(20_000);
+    }
+    bytes
+}
+
+/// Longer than this for an input of 20 kB is a hang.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+fn fuzz(target: &str, seeds: &[Vec<u8>], read: impl Fn(&[u8])) {
+    let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    let rounds = number("TOPIPE_FUZZ").unwrap_or(3000);
+    let mut random = Random(number("TOPIPE_FUZZ_SEED").unwrap_or(1) ^ target.len() as u64);
+    std::panic::set_hook(Box::new(|_| {}));
+    assert!(!seeds.is_empty(), "{target} has no seeds");
+    let run = |bytes: &[u8]| {
+        let start = Instant::now();
+        let result = std::panic::catch_unwind(AssertUnwindSafe(|| read(bytes)));
+        if result.is_err() || start.elapsed() > PATIENCE {
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/fuzz");
+            std::fs::create_dir_all(&folder).unwrap();
+            let file = folder.join(format!("{target}-{}", &blake3_name(bytes)));
+            std::fs::write(&file, bytes).unwrap();
+            let what = if result.is_err() { "panics on" } else { "hangs on" };
+            panic_with(format!("{target} {what} {}", file.display()));
+        }
+    };
+    // The seeds as they are, among them all that ever made trouble.
+    seeds.iter().for_each(|seed| run(seed));
+    for _ in 0..rounds {
+        run(&mutate(&mut random, seeds));
+    }
+}
+
+fn panic_with(message: String) -> ! {
+    let _ = std::panic::take_hook();
+    panic!("{message}");
+}
+
+fn blake3_name(bytes: &[u8]) -> String {
+    topipe_engine::ContentHash::of(bytes).short()
+}
+
+/// The files with this ending in the zoo and the corpus, small ones only.
+fn corpus(target: &str, endings: &[&str]) -> Vec<Vec<u8>> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut files = Vec::new();
+    let mut open: Vec<PathBuf> = vec![root.join("fixtures/zoo"), root.join("tests/corpus").join(target)];
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            let kept_here = path.parent().is_some_and(|folder| folder.ends_with(target));
+            if path.is_dir() {
+                open.push(path);
+            } else if kept_here || path.extension().is_some_and(|e| endings.iter().any(|ending| e == *ending))
+            {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    files.into_iter().map(|file| std::fs::read(file).unwrap()).filter(|bytes| bytes.len() <= 20_000).collect()
+}
+
+fn tetrahedron() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    (points, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+}
+
+fn mesh(target: &str, ending: &str, mut seeds: Vec<Vec<u8>>) {
+    seeds.extend(corpus(target, &[ending]));
+    let name = format!("part.{ending}");
+    fuzz(target, &seeds, |bytes| {
+        let _ = topipe_mesh::import::read(&name, bytes, &Default::default());
+    });
+}
+
+#[test]
+fn stl() {
+    let (points, faces) = tetrahedron();
+    let mut binary = vec![0u8; 80];
+    binary.extend((faces.len() as u32).to_le_bytes());
+    let mut text = String::from("solid t\n");
+    for face in &faces {
+        binary.extend([0u8; 12]);
+        text += "facet normal 0 0 0\nouter loop\n";
+        for corner in face.map(|corner| points[corner as usize]) {
+            binary.extend(corner.iter().flat_map(|x| x.to_le_bytes()));
+            text += &format!("vertex {} {} {}\n", corner[0], corner[1], corner[2]);
+        }
+        binary.extend([0u8; 2]);
+        text += "endloop\nendfacet\n";
+    }
+    text += "endsolid t\n";
+    mesh("stl", "stl", vec![binary, text.into_bytes()]);
+}
+
+fn text_mesh(header: &str, face: &str, from: u32) -> Vec<u8> {
+    let (points, faces) = tetrahedron();
+    let mut text = header.to_owned();
+    let vertex = if face == "f" { "v " } else { "" };
+    for [x, y, z] in points {
+        text += &format!("{vertex}{x} {y} {z}\n");
+    }
+    for [a, b, c] in faces {
+        text += &format!("{face} {} {} {}\n", a + from, b + from, c + from);
+    }
+    text.into_bytes()
+}
+
+#[test]
+fn off() {
+    mesh("off", "off", vec![text_mesh("OFF\n4 4 0\n", "3", 0)]);
+}
+
+#[test]
+fn obj() {
+    mesh("obj", "obj", vec![text_mesh("# t\n", "f", 1)]);
+}
+
+#[test]
+fn ply() {
+    let header = |format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+        )
+    };
+    let ascii = text_mesh(&header("ascii"), "3", 0);
+    let (points, faces) = tetrahedron();
+    let mut binary = header("binary_little_endian").into_bytes();
+    binary.extend(points.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    for face in faces {
+        binary.push(3);
+        binary.extend(face.iter().flat_map(|corner| corner.to_le_bytes()));
+    }
+    mesh("ply", "ply", vec![ascii, binary]);
+}
+
+#[test]
+fn spec() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../pipelines");
+    let mut seeds = corpus("spec", &[]);
+    for name in ["bracket.toml", "cantilever.toml"] {
+        seeds.push(std::fs::read(root.join(name)).unwrap());
+    }
+    seeds.push(
+        b"[stage.a]\nkind = \"import\"\npath = \"x.stl\"\n[stage.b]\nkind = \"smoothing\"\ninput = \"a\"\n\
+          [export]\n\"b.stl\" = \"b\"\n[sweep]\ngrid = { \"b.lambda\" = [0.1, 0.2], b.mu = [1] }\n\
+          zip = { \"b.iterations\" = [1, 2] }\ncases = [{ name = \"x\", \"b.method\" = \"taubin\" }]\nfigures = [\"b.x\"]\n"
+            .to_vec(),
+    );
+    let registry = topipe::stages::registry();
+    fuzz("spec", &seeds, |bytes| {
+        if let Ok(text) = std::str::from_utf8(bytes) {
+            // A message must be printable, whatever it points at.
+            if let Err(error) = Pipeline::parse(Path::new("p.toml"), text.to_owned(), &[], &registry) {
+                assert!(error.to_string().starts_with("error: "));
+            }
+        }
+    });
+}
+
+#[test]
+fn command_line_values() {
+    let spec =
+        "[stage.a]\nkind = \"import\"\npath = \"x.stl\"\n[stage.b]\nkind = \"smoothing\"\ninput = \"a\"\n";
+    let registry = topipe::stages::registry();
+    let seeds = [&b"b.lambda=0.5"[..], b"b.method=taubin", b"b.path=\"x\"", b"a.non_design=[{type=\"box\"}]"];
+    fuzz("set", &seeds.map(<[u8]>::to_vec), |bytes| {
+        let Some(over) = std::str::from_utf8(bytes).ok().and_then(|text| text.parse().ok()) else { return };
+        if let Err(error) = Pipeline::parse(Path::new("p.toml"), spec.to_owned(), &[over], &registry) {
+            assert!(error.to_string().starts_with("error: "));
+        }
+    });
+}
+
+/// Whole files, and payloads under a header that vouches for them: what a hostile hand would write.
+fn artifact<K: ArtifactKind>(seeds: Vec<Vec<u8>>)
+where
+    K::Value: 'static,
+{
+    let target = format!("artifact-{}", K::NAME.replace(' ', "-"));
+    let mut seeds = seeds;
+    seeds.extend(corpus(&target, &[]));
+    seeds.push(vec![0; 64]);
+    seeds.push([(1u64 << 61).to_le_bytes(), [0xFF; 8]].concat());
+    fuzz(&target, &seeds, |bytes| {
+        let _ = codec::decode::<K::Value>(bytes, K::NAME, K::VERSION);
+        let _ = codec::decode::<K::Value>(&codec::frame(bytes, K::NAME, K::VERSION), K::NAME, K::VERSION);
+    });
+}
+
+#[test]
+fn artifacts() {
+    use topipe::artifacts::{Mesh, QuadLayout, Report, Skeleton, SplineSurface, Tiling};
+    let off = text_mesh("OFF\n4 4 0\n", "3", 0);
+    let part = topipe_mesh::import::read("t.off", &off, &Default::default()).unwrap();
+    let file = codec::encode(&part, Mesh::NAME, Mesh::VERSION).unwrap();
+    let payload = codec::open(&file).unwrap().1.to_vec();
+    artifact::<Mesh>(vec![file, payload.clone()]);
+    // A part is what most others begin with.
+    artifact::<Tiling>(vec![payload.clone()]);
+    artifact::<QuadLayout>(vec![payload.clone()]);
+    artifact::<SplineSurface>(vec![payload]);
+    artifact::<Skeleton>(Vec::new());
+    artifact::<Report>(Vec::new());
+}
