@@ -130,6 +130,75 @@ fn take<const N: usize>(bytes: &mut &[u8]) -> Result<[u8; N], DecodeError> {
 
 /// Splits a file into header and payload and checks the one against the other.
 pub fn open(file: &[u8]) -> Result<(Header, &[u8]), DecodeError> {
+    let (header, rest) = split(file)?;
+    if header.payload_bytes != rest.len() as u64 {
+        return Err(DecodeError::Length { expected: header.payload_bytes, found: rest.len() as u64 });
+    }
+    if ContentHash::of(rest) != header.payload_hash {
+        return Err(DecodeError::PayloadHash);
+    }
+    Ok((header, rest))
+}
+
+/// No header is longer.
+const LONGEST_HEADER: usize = 60 + LONGEST_KIND;
+/// What is read at a time: it stays in the second-level cache between reading and hashing.
+const BLOCK: usize = 256 * 1024;
+/// From this size on one file is hashed by all threads, which needs larger blocks.
+const LARGE: u64 = 64 << 20;
+const LARGE_BLOCK: usize = 16 << 20;
+
+/// Reads a file, checks header and payload against each other, and returns the header. Unlike [`open`] it never holds
+/// the whole file.
+pub fn verify(mut file: impl std::io::Read, length: u64) -> std::io::Result<Result<Header, DecodeError>> {
+    let mut block = vec![0; if length < LARGE { BLOCK } else { LARGE_BLOCK }];
+    let mut filled = fill(&mut file, &mut block)?;
+    let (header, start) = match split(&block[..filled.min(LONGEST_HEADER)]) {
+        // The rest of the first bytes belongs to the payload.
+        Ok((header, rest)) => (header, filled.min(LONGEST_HEADER) - rest.len()),
+        Err(error) => return Ok(Err(error)),
+    };
+    let mut hasher = blake3::Hasher::new();
+    let (mut from, mut found) = (start, 0);
+    loop {
+        let bytes = &block[from..filled];
+        found += bytes.len() as u64;
+        if length < LARGE {
+            hasher.update(bytes)
+        } else {
+            hasher.update_rayon(bytes)
+        };
+        if filled < block.len() {
+            break;
+        }
+        from = 0;
+        filled = fill(&mut file, &mut block)?;
+    }
+    Ok(if found != header.payload_bytes {
+        Err(DecodeError::Length { expected: header.payload_bytes, found })
+    } else if hasher.finalize().as_bytes() != header.payload_hash.as_bytes() {
+        Err(DecodeError::PayloadHash)
+    } else {
+        Ok(header)
+    })
+}
+
+/// Reads until the buffer is full or the file ends.
+fn fill(file: &mut impl std::io::Read, buffer: &mut [u8]) -> std::io::Result<usize> {
+    let mut filled = 0;
+    while filled < buffer.len() {
+        match file.read(&mut buffer[filled..]) {
+            Ok(0) => break,
+            Ok(count) => filled += count,
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(filled)
+}
+
+/// Splits the header from what follows it.
+fn split(file: &[u8]) -> Result<(Header, &[u8]), DecodeError> {
     let mut rest = file;
     if take::<8>(&mut rest).map_err(|_| DecodeError::NotAnArtifact)? != MAGIC {
         return Err(DecodeError::NotAnArtifact);
@@ -147,12 +216,6 @@ pub fn open(file: &[u8]) -> Result<(Header, &[u8]), DecodeError> {
     let kind = std::str::from_utf8(kind).map_err(|_| DecodeError::Header)?.to_owned();
     let payload_bytes = u64::from_le_bytes(take(&mut rest)?);
     let payload_hash = ContentHash::from_bytes(take(&mut rest)?);
-    if payload_bytes != rest.len() as u64 {
-        return Err(DecodeError::Length { expected: payload_bytes, found: rest.len() as u64 });
-    }
-    if ContentHash::of(rest) != payload_hash {
-        return Err(DecodeError::PayloadHash);
-    }
     Ok((Header { kind, version, payload_bytes, payload_hash }, rest))
 }
 
@@ -274,6 +337,25 @@ mod tests {
             damaged[bit / 8] ^= 1 << (bit % 8);
             assert!(decode::<Sample>(&damaged, "sample", 1).is_err(), "bit {bit}");
         }
+    }
+
+    #[test]
+    fn a_file_verifies_piece_by_piece_as_it_does_whole() {
+        let check = |bytes: &[u8]| {
+            let whole = open(bytes).map(|(header, _)| header);
+            assert_eq!(verify(bytes, bytes.len() as u64).unwrap(), whole);
+            whole.is_ok()
+        };
+        for length in [0, 1, BLOCK - 70, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK] {
+            let mut file = frame(&vec![7; length], "sample", 1);
+            assert!(check(&file));
+            *file.last_mut().unwrap() ^= 1;
+            assert!(!check(&file));
+            file.push(0);
+            assert!(!check(&file));
+        }
+        let file = encode(&sample(), "sample", 1).unwrap();
+        assert!((0..file.len()).all(|length| !check(&file[..length])));
     }
 
     #[test]

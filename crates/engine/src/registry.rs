@@ -3,7 +3,6 @@
 use crate::artifact::{ArtifactKind, ArtifactType, Value};
 use crate::stage::{AnyStage, Erased, Stage, StageError};
 use std::io::Write;
-use std::marker::PhantomData;
 use std::sync::Arc;
 
 type WriteValue = dyn Fn(&Value, &str, &mut dyn Write) -> Result<(), ExportError> + Send + Sync;
@@ -80,7 +79,7 @@ impl Registry {
     #[must_use]
     pub fn with_stage<S: Stage>(mut self, stage: S) -> Self {
         self.stages.retain(|known| known.kind() != S::KIND);
-        self.stages.push(Arc::new(Erased(stage, PhantomData)));
+        self.stages.push(Arc::new(Erased::new(stage)));
         self
     }
 

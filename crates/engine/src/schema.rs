@@ -48,6 +48,14 @@ pub fn parameter_fields(stage: &dyn AnyStage) -> Vec<ParameterField> {
     fields
 }
 
+/// The names of all fields a stage of this kind may have, but `kind`.
+pub(crate) fn field_names(stage: &dyn AnyStage) -> Vec<String> {
+    let mut names: Vec<String> = stage.inputs().iter().map(|port| port.name.to_owned()).collect();
+    names.extend(stage.files().iter().map(|file| file.name.to_owned()));
+    names.extend(parameter_fields(stage).into_iter().map(|field| field.name));
+    names
+}
+
 fn doc(schema: &Value) -> String {
     let text = schema.get("description").and_then(Value::as_str).unwrap_or_default();
     text.split_whitespace().collect::<Vec<_>>().join(" ")
@@ -141,10 +149,34 @@ pub fn pipeline_schema(registry: &Registry) -> Value {
                 "type": "object",
                 "description": "File name = stage; the ending picks the format.",
                 "additionalProperties": { "type": "string" }
+            },
+            "sweep": {
+                "type": "object",
+                "description": "Many variants of the pipeline: all combinations of cases, rows of zip, and grid.",
+                "additionalProperties": false,
+                "properties": {
+                    "grid": lists("\"STAGE.FIELD\" = [values]: every value with every other."),
+                    "zip": lists("\"STAGE.FIELD\" = [values]: first with first, second with second."),
+                    "cases": {
+                        "type": "array",
+                        "description": "Variants one by one: { name = \"...\", \"STAGE.FIELD\" = value }.",
+                        "items": { "type": "object", "properties": { "name": { "type": "string" } } }
+                    },
+                    "figures": {
+                        "type": "array",
+                        "description": "Columns of the table of results: \"STAGE.PATH\" into the stage's report.",
+                        "items": { "type": "string" }
+                    }
+                }
             }
         },
         "definitions": definitions
     })
+}
+
+fn lists(description: &str) -> Value {
+    let values = json!({ "anyOf": [{ "type": "array" }, { "type": "object" }] });
+    json!({ "type": "object", "description": description, "additionalProperties": values })
 }
 
 fn stage_schema(stage: &dyn AnyStage, generator: &mut SchemaGenerator) -> Value {

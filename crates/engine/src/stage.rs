@@ -7,8 +7,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::any::Any;
 use std::collections::BTreeMap;
-use std::marker::PhantomData;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use topipe_progress::{Progress, UnitKey, Units};
 
 /// A field of a stage that names another stage, whose artifact it reads.
@@ -274,6 +273,8 @@ pub trait AnyStage: Send + Sync {
     fn check(&self, parameters: &ResolvedParameters) -> Result<(), BadValue>;
     /// Runs the stage.
     fn run(&self, context: &StageContext<'_>, parameters: &ResolvedParameters) -> Result<Value, StageError>;
+    /// The names of all fields it may have in a spec, but `kind`.
+    fn field_names(&self) -> &[String];
     /// Whether it can name the parts it needs.
     fn names_units(&self) -> bool;
     /// The parts a run would need.
@@ -285,7 +286,16 @@ pub trait AnyStage: Send + Sync {
 }
 
 /// Erases the types of a [`Stage`].
-pub(crate) struct Erased<S: Stage>(pub(crate) S, pub(crate) PhantomData<fn() -> S>);
+pub(crate) struct Erased<S: Stage> {
+    stage: S,
+    field_names: OnceLock<Vec<String>>,
+}
+
+impl<S: Stage> Erased<S> {
+    pub(crate) fn new(stage: S) -> Self {
+        Self { stage, field_names: OnceLock::new() }
+    }
+}
 
 impl<S: Stage> AnyStage for Erased<S> {
     fn kind(&self) -> &'static str {
@@ -297,7 +307,7 @@ impl<S: Stage> AnyStage for Erased<S> {
     }
 
     fn code_version(&self) -> String {
-        self.0.code_version()
+        self.stage.code_version()
     }
 
     fn output(&self) -> ArtifactType {
@@ -305,11 +315,11 @@ impl<S: Stage> AnyStage for Erased<S> {
     }
 
     fn inputs(&self) -> Vec<InputPort> {
-        self.0.inputs()
+        self.stage.inputs()
     }
 
     fn files(&self) -> Vec<FileField> {
-        self.0.files()
+        self.stage.files()
     }
 
     fn schema(&self, generator: &mut SchemaGenerator) -> Schema {
@@ -324,7 +334,7 @@ impl<S: Stage> AnyStage for Erased<S> {
     fn parse(&self, table: toml::de::Deserializer<'_>) -> Result<ResolvedParameters, toml::de::Error> {
         let typed = <S::Parameters as serde::Deserialize>::deserialize(table)?;
         let json = serde_json::to_value(&typed).map_err(serde::de::Error::custom)?;
-        let nested_files = self.0.nested_files(&typed);
+        let nested_files = self.stage.nested_files(&typed);
         let mut essence = json.clone();
         for pointer in &nested_files {
             if let Some(name) = essence.pointer_mut(pointer) {
@@ -336,11 +346,15 @@ impl<S: Stage> AnyStage for Erased<S> {
 
     fn check(&self, parameters: &ResolvedParameters) -> Result<(), BadValue> {
         // Parameters of another kind are refused by `run`.
-        parameters.typed.downcast_ref::<S::Parameters>().map_or(Ok(()), |typed| self.0.check(typed))
+        parameters.typed.downcast_ref::<S::Parameters>().map_or(Ok(()), |typed| self.stage.check(typed))
     }
 
     fn run(&self, context: &StageContext<'_>, parameters: &ResolvedParameters) -> Result<Value, StageError> {
-        self.0.run(context, typed::<S>(parameters)?).map(|value| Arc::new(value) as Value)
+        self.stage.run(context, typed::<S>(parameters)?).map(|value| Arc::new(value) as Value)
+    }
+
+    fn field_names(&self) -> &[String] {
+        self.field_names.get_or_init(|| crate::schema::field_names(self))
     }
 
     fn names_units(&self) -> bool {
@@ -352,7 +366,7 @@ impl<S: Stage> AnyStage for Erased<S> {
         context: &StageContext<'_>,
         parameters: &ResolvedParameters,
     ) -> Result<Vec<NeededUnits>, StageError> {
-        self.0.needed_units(context, typed::<S>(parameters)?)
+        self.stage.needed_units(context, typed::<S>(parameters)?)
     }
 }
 

@@ -39,6 +39,8 @@ enum Status {
 struct Schedule {
     status: Vec<Status>,
     running: usize,
+    /// All before this place in the order have begun or never will.
+    front: usize,
     /// Nothing more is begun.
     stopping: bool,
 }
@@ -81,6 +83,7 @@ impl<'a> Executor<'a> {
             schedule: Mutex::new(Schedule {
                 status: vec![Status::Waiting; count],
                 running: 0,
+                front: 0,
                 stopping: false,
             }),
             wake: Condvar::new(),
@@ -139,7 +142,10 @@ impl<'a> Executor<'a> {
 
     /// The first stage that can begin. Stages that never can are marked on the way.
     fn next(&self, schedule: &mut Schedule) -> Option<usize> {
-        for &stage in &self.order {
+        while self.order.get(schedule.front).is_some_and(|&stage| schedule.status[stage] != Status::Waiting) {
+            schedule.front += 1;
+        }
+        for &stage in &self.order[schedule.front..] {
             if schedule.status[stage] != Status::Waiting {
                 continue;
             }

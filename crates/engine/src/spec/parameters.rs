@@ -3,7 +3,6 @@
 use super::overrides::{self, Sourced};
 use super::{Checked, Place};
 use crate::diagnostic::{Diagnostic, Source};
-use crate::schema;
 use crate::stage::{AnyStage, ResolvedParameters};
 use std::sync::Arc;
 use toml::Spanned;
@@ -101,12 +100,4 @@ fn refuse_infinite(source: &Arc<Source>, field: &str, value: &Spanned<DeValue<'_
         }
         _ => Ok(()),
     }
-}
-
-/// The names of all fields a stage of this kind may have, but `kind`.
-pub(super) fn field_names(stage: &dyn AnyStage) -> Vec<String> {
-    let mut names: Vec<String> = stage.inputs().iter().map(|port| port.name.to_owned()).collect();
-    names.extend(stage.files().iter().map(|file| file.name.to_owned()));
-    names.extend(schema::parameter_fields(stage).into_iter().map(|field| field.name));
-    names
 }

@@ -6,7 +6,7 @@ use super::{Checked, FileInput, Place, StageNode, string, table, with_article};
 use crate::diagnostic::{Diagnostic, Source};
 use crate::registry::Registry;
 use crate::stage::AnyStage;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 use toml::Spanned;
@@ -217,7 +217,7 @@ fn accept(
     if let Some(file) = section.stage.files().into_iter().find(|file| file.name == field) {
         return Ok(Role::File(file.name, string(source, value, &format!("`{field}` names a file: it"))?));
     }
-    let known = parameters::field_names(section.stage.as_ref());
+    let known = section.stage.field_names();
     if known.iter().any(|name| name == field) {
         return Ok(Role::Parameter);
     }
@@ -254,23 +254,26 @@ fn require(section: &Section<'_, '_>, wanted: &Wanted, files: &BTreeMap<String, 
 fn connect(mut nodes: Vec<StageNode>, wanted: &[Wanted]) -> Checked<Vec<PlacedStage>> {
     let known: Vec<(String, crate::ArtifactType)> =
         nodes.iter().map(|node| (node.name.clone(), node.stage.output())).collect();
+    let index_of: HashMap<String, usize> =
+        known.iter().enumerate().map(|(index, (name, _))| (name.clone(), index)).collect();
     let mut placed = Vec::new();
     for (node, wanted) in nodes.drain(..).zip(wanted) {
         let mut node = node;
         let mut input_places = BTreeMap::new();
         for port in node.stage.inputs() {
             let Some((target, place)) = wanted.get(port.name) else { continue };
-            let fitting: Vec<&str> = known
-                .iter()
-                .filter(|(name, artifact)| *artifact == port.artifact && *name != node.name)
-                .map(|(name, _)| name.as_str())
-                .collect();
-            let Some(index) = known.iter().position(|(name, _)| name == target) else {
+            let fitting = || -> Vec<&str> {
+                let fits = |(name, artifact): &&(String, crate::ArtifactType)| {
+                    *artifact == port.artifact && *name != node.name
+                };
+                known.iter().filter(fits).map(|(name, _)| name.as_str()).collect()
+            };
+            let Some(&index) = index_of.get(target) else {
                 let message = format!("there is no stage `{target}`");
                 let all = known.iter().map(|(name, _)| name.as_str());
                 return Err(Box::new(match crate::diagnostic::nearest(target, all) {
                     Some(near) => place.diagnostic(message).help(format!("did you mean `{near}`?")),
-                    None => place.diagnostic(message).suggest(target, fitting),
+                    None => place.diagnostic(message).suggest(target, fitting()),
                 }));
             };
             let made = known[index].1;
@@ -282,6 +285,7 @@ fn connect(mut nodes: Vec<StageNode>, wanted: &[Wanted]) -> Checked<Vec<PlacedSt
                     with_article(port.artifact.name),
                     with_article(made.name)
                 );
+                let fitting = fitting();
                 let list = fitting.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
                 let help = if fitting.is_empty() {
                     format!("no stage of this pipeline makes {}", with_article(port.artifact.name))
