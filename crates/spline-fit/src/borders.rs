@@ -223,3 +223,164 @@ pub(crate) fn meet(shapes: &[&RegionShape], start: DVec3) -> DVec3 {
     }
     p
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::CurveShape;
+    use std::f64::consts::TAU;
+    use topipe_mesh::{Part, Region, VertexId};
+    use topipe_quad_matching::{MacroEdge, RegionFace, Side};
+
+    const SECTORS: u32 = 64;
+    const HOLE: f64 = 3.0;
+
+    /// A washer in any position: its top a plane with a ragged outer border, its bore a cylinder, the rest free. All
+    /// borders are divided into four macro-edges. Rings of vertices: bore below, bore above, outer above, outer below.
+    fn washer(turn: DMat3, away: DVec3, smooth_end: bool) -> QuadLayout {
+        let mut points = Vec::new();
+        for (radius, z) in [(HOLE, -2.0), (HOLE, 0.0), (7.0, 0.0), (7.0, -2.0)] {
+            for k in 0..SECTORS {
+                let (s, c) = (TAU * f64::from(k) / f64::from(SECTORS)).sin_cos();
+                // Teeth of the outer border, and a bore whose lower end waves.
+                let tooth = if radius > HOLE && z == 0.0 && k % 2 == 0 { 0.15 } else { 0.0 };
+                let wave = if radius == HOLE && z < 0.0 && !smooth_end { 0.3 * (2.0 * s) } else { 0.0 };
+                let p = DVec3::new((radius + tooth) * c, (radius + tooth) * s, z + wave);
+                points.push((turn * p + away).to_array());
+            }
+        }
+        let at = |ring: u32, k: u32| ring % 4 * SECTORS + k % SECTORS;
+        let (mut triangles, mut regions) = (Vec::new(), Vec::new());
+        for ring in 0..4 {
+            for k in 0..SECTORS {
+                let (a, b, c, d) = (at(ring, k), at(ring + 1, k), at(ring + 1, k + 1), at(ring, k + 1));
+                triangles.extend([[a, b, c], [a, c, d]]);
+                regions
+                    .extend([[RegionId(1), RegionId(0), RegionId::NONE, RegionId::NONE][ring as usize]; 2]);
+            }
+        }
+        let mut part = Part::new(TriangleMesh::from_arrays(points, triangles));
+        assert!(part.mesh.volume() > 0.0);
+        part.region_of_face = regions;
+        let (axis, center) = (turn * DVec3::Z, away);
+        // The mesh does not know the axis better than this.
+        let tilted = (axis + 1e-9 * (turn * DVec3::X)).normalize();
+        for shape in [
+            RegionShape::Plane { point: center, normal: axis },
+            RegionShape::Cylinder { point: center - axis, axis: tilted, radius: HOLE, hole: true },
+        ] {
+            part.regions.push(Region { shape, area: 0.0, residual: 1e-7 });
+        }
+        let quarter = SECTORS / 4;
+        let mut edges = Vec::new();
+        for ring in 0..3 {
+            for q in 0..4u32 {
+                let path = (0..=quarter).map(|k| VertexId(at(ring, q * quarter + k))).collect();
+                edges.push(MacroEdge { ends: [4 * ring + q, 4 * ring + (q + 1) % 4], path, feature: None });
+            }
+        }
+        let rim = |ring: u32, reversed: bool| -> Vec<Side> {
+            let sides = (0..4).map(|q| Side { edge: 4 * ring + q, reversed });
+            if reversed { sides.rev().collect() } else { sides.collect() }
+        };
+        QuadLayout {
+            vertices: (0..12).map(|v| VertexId(at(v / 4, v % 4 * quarter))).collect(),
+            edges,
+            quads: Vec::new(),
+            quad_of_face: vec![QuadLayout::NO_QUAD; part.mesh.face_count()],
+            region_faces: vec![
+                RegionFace { region: RegionId(0), loops: vec![rim(2, false), rim(1, true)] },
+                RegionFace { region: RegionId(1), loops: vec![rim(1, false), rim(0, true)] },
+            ],
+            part,
+            tiles: 0,
+            macro_triangles: 0,
+        }
+    }
+
+    fn positions() -> [(DMat3, DVec3); 2] {
+        let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
+        [(DMat3::IDENTITY, DVec3::ZERO), (turn, DVec3::new(30.0, -20.0, 7.0))]
+    }
+
+    #[test]
+    fn curves_lie_on_their_shapes_and_start_at_their_vertices() {
+        for ((turn, away), smooth_end) in positions().into_iter().flat_map(|p| [(p, true), (p, false)]) {
+            let layout = washer(turn, away, smooth_end);
+            let found = borders(&layout).unwrap();
+            assert!(found.vertices.iter().all(Option::is_some) && found.curves.iter().all(Option::is_some));
+            for face in &found.faces {
+                for side in face.loops.iter().flatten() {
+                    let curve = found.curves[side.edge as usize].as_ref().unwrap();
+                    let last = curve.control.len() - 1;
+                    for (v, p) in curve.ends.into_iter().zip([curve.control[0], curve.control[last]]) {
+                        assert_eq!(found.vertices[v as usize], Some(p), "bit for bit");
+                    }
+                    for k in 0..=200 {
+                        let t = f64::from(k) / 200.0;
+                        let off = face.shape.distance(curve.position(t)).abs();
+                        assert!(off <= 1.01 * found.tolerance, "{off}");
+                        assert!(face.shape.distance(curve.exact(t).position).abs() <= 1.01 * found.tolerance);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_rim_of_a_bore_is_four_arcs_of_one_circle() {
+        for (turn, away) in positions() {
+            let found = borders(&washer(turn, away, true)).unwrap();
+            for curve in found.curves[4..8].iter().flatten() {
+                let CurveShape::Arc { center, axis, radius } = curve.shape else { panic!("no arc") };
+                assert!(center.distance(away) < 1e-7 && axis.dot(turn * DVec3::Z) > 1.0 - 1e-15);
+                assert_eq!(radius, HOLE);
+                assert!((curve.sweep().unwrap() - TAU / 4.0).abs() < 1e-7);
+            }
+        }
+    }
+
+    #[test]
+    fn ragged_borders_become_smooth_and_have_no_kinks() {
+        let (turn, away) = positions()[1];
+        for (smooth_end, ring) in [(true, 2), (false, 2), (false, 0)] {
+            let layout = washer(turn, away, smooth_end);
+            let found = borders(&layout).unwrap();
+            let curve = |q: usize| found.curves[4 * ring + q % 4].as_ref().unwrap();
+            for q in 0..4 {
+                let (a, b) = (curve(q).exact(1.0).derivative, curve(q + 1).exact(0.0).derivative);
+                assert!(a.angle_between(b) < 1e-7, "a kink of {}", a.angle_between(b));
+            }
+            if ring == 2 {
+                // Teeth of 0.15 mm at every second vertex are gone: what is left is nearly their mean circle.
+                for q in 0..4 {
+                    for k in 0..50 {
+                        let radius = curve(q).position(f64::from(k) / 50.0).distance(away);
+                        assert!((radius - 7.075).abs() < 0.03, "{radius}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn borders_are_features_only_where_the_mesh_is_sharp() {
+        let (turn, away) = positions()[0];
+        let mut layout = washer(turn, away, true);
+        let features = |layout: &QuadLayout| -> Vec<_> {
+            borders(layout).unwrap().curves.iter().map(|c| c.as_ref().unwrap().feature).collect()
+        };
+        use topipe_mesh::FeatureKind::{HoleRim, RegionBorder};
+        let found = features(&layout);
+        assert!(
+            found[..8].iter().all(|&f| f == Some(HoleRim))
+                && found[8..].iter().all(|&f| f == Some(RegionBorder))
+        );
+        // Pull the outer wall out until it goes on almost in the plane.
+        for v in 3 * SECTORS..4 * SECTORS {
+            let p = &mut layout.part.mesh.positions[v as usize];
+            *p = DVec3::new(2.5 * p.x, 2.5 * p.y, p.z);
+        }
+        assert!(features(&layout)[8..].iter().all(Option::is_none));
+    }
+}

@@ -3,7 +3,10 @@
 //! Source: Beccari, Ceruti, Chudy 2025, *From Topological Optimization to Spline Layouts*, section 2.3, after Mosbach
 //! et al. 2022, *A Local Approach for Computing Smooth B-Spline Surfaces for Arbitrary Quadrilateral Base Meshes*.
 //!
-//! Guarantees: each quad gives one patch; control points on shared edges are equal bit for bit, so the surface is
+//! Regions of the layout that are faces of their own become trimmed planes and cylinders; their borders are exact curves
+//! that patches share.
+//!
+//! Guarantees: each quad gives one patch, each region face one analytic face; control points on shared edges are equal bit for bit, so the surface is
 //! watertight; the result does not depend on the number of threads. A part scaled by a power of two gives the same
 //! control points, scaled.
 //!

@@ -88,7 +88,11 @@ fn turns(layout: &QuadLayout, before: Side, after: Side, reach: f64) -> bool {
     let mut back = positions(layout.path(before));
     back.reverse();
     let ahead = positions(layout.path(after));
-    let direction = |points: &[DVec3]| walked(points, reach) - points[0];
+    let direction = |points: &[DVec3]| {
+        let length: f64 = points.windows(2).map(|w| w[0].distance(w[1])).sum();
+        // A long way along a round border turns too: no more than a third of an edge.
+        walked(points, reach.min((length / 3.0).max(reach / CORNER_REACH))) - points[0]
+    };
     let angle = direction(&ahead).angle_between(-direction(&back)).to_degrees();
     angle > CORNER_ANGLE
 }

@@ -290,7 +290,9 @@ fn around_piece(
             };
             let (q, slope) = curve.at(s);
             heights.push(DVec3::Z * q.y);
-            slopes.push(DVec3::Z * (slope.y / slope.x * (to - from)));
+            // As long as the arc's own slopes, so that the direction is that of the curve exactly.
+            let length = 4.0 * spans as f64 * (sweep / spans as f64 / 4.0).tan() * circle.radius;
+            slopes.push(DVec3::Z * (slope.y / slope.x * length));
         }
         let heights = hermite::control(&heights, &slopes);
         let basis = hermite::basis(spans);
