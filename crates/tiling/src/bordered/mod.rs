@@ -89,6 +89,7 @@ pub(crate) fn tile(
     let mut surface = Surface::new(refiner, region_of_face, size);
     surface.densify(parameters.faces_per_tile, progress)?;
     let segments = if parameters.follow_features { barriers::segments(&mut surface) } else { Vec::new() };
+    progress.remark(&format!("size {spacing:.3} mm, {} segments of features", segments.len()));
     let mut construction = Construction {
         is_node: Vec::new(),
         surface,

@@ -11,7 +11,7 @@ use super::surface::NONE;
 use super::{Construction, Seed};
 use crate::TilingError;
 use std::collections::{BTreeMap, BinaryHeap};
-use topipe_mesh::{FaceId, HalfEdgeId};
+use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
 
 /// Rounds after which it gives up. Cutting needs a few; lenses may ask for some more.
 const MOST_ROUNDS: usize = 60;
@@ -40,8 +40,12 @@ impl Construction<'_> {
                 // Faces that were split since still belong to it; they are looked at in the next round.
                 let found = outline(surface, &faces, |h| surface.is_border(h), &is_corner, &mut stamps);
                 match found {
-                    Err(Fault::NotDisk | Fault::Pinch(_)) => {
-                        if self.bisect(tile, &faces) {
+                    Err(fault) => {
+                        let parted = match fault {
+                            Fault::Pinch(v) => self.part(tile, v),
+                            Fault::NotDisk => false,
+                        };
+                        if parted || self.bisect(tile, &faces, &is_corner, &mut stamps) {
                             changes += 1;
                             self.mark_neighbors(&faces, &mut busy);
                         } else {
@@ -105,11 +109,38 @@ impl Construction<'_> {
         found
     }
 
+    /// Cuts a tile that touches itself at a vertex in two, from the two fans it has there.
+    fn part(&mut self, tile: u32, v: VertexId) -> bool {
+        let surface = &self.surface;
+        let fan = surface.refiner.outgoing(v);
+        let n = fan.len();
+        let own = |i: usize| surface.owner[fan[i % n].face().index()] == tile;
+        // A run begins where the half-edge is a border.
+        let begins: Vec<usize> = (0..n).filter(|&i| own(i) && surface.is_border(fan[i])).collect();
+        let [first, second, ..] = begins[..] else { return false };
+        let run = |begin: usize| {
+            let mut faces = vec![fan[begin].face()];
+            let mut i = begin + 1;
+            while i < begin + n && own(i) && !surface.is_border(fan[i % n]) {
+                faces.push(fan[i % n].face());
+                i += 1;
+            }
+            faces
+        };
+        let seeds: Vec<(u32, FaceId)> =
+            run(first).into_iter().map(|f| (0, f)).chain(run(second).into_iter().map(|f| (1, f))).collect();
+        self.take(tile, &seeds);
+        true
+    }
+
     /// Cuts a tile in two; false where it is a single face.
-    fn bisect(&mut self, tile: u32, faces: &[FaceId]) -> bool {
+    fn bisect(&mut self, tile: u32, faces: &[FaceId], is_corner: &[bool], stamps: &mut Stamps) -> bool {
         let fixed: Vec<FaceId> = faces.iter().copied().filter(|f| self.surface.fixed[f.index()]).collect();
-        // What lies along segments stays together if there is anything else.
-        let all_fixed = fixed.len() == faces.len();
+        // What lies along segments stays together if there is anything else, and if it is a disk by itself.
+        let in_own = |f: FaceId| self.surface.fixed[f.index()] && self.surface.owner[f.index()] == tile;
+        let ends = |h: HalfEdgeId| self.surface.is_barrier(h) || !in_own(self.surface.refiner.twin(h).face());
+        let all_fixed = fixed.len() == faces.len()
+            || (!fixed.is_empty() && outline(&self.surface, &fixed, ends, is_corner, stamps).is_err());
         let fixed = if all_fixed { Vec::new() } else { fixed };
         let farthest = |found: &BTreeMap<FaceId, (f64, u32)>| {
             // Not reached at all is farthest.

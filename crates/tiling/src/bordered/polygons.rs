@@ -11,11 +11,11 @@ use std::collections::BTreeMap;
 use topipe_mesh::FaceId;
 
 /// Tiles with more sides are divided.
-const MOST_SIDES: usize = 7;
+const MOST_SIDES: usize = 9;
 /// Tiles of less than this area, in squares of the local size, are not divided because they bend.
 const LEAST_AREA: f64 = 0.25;
 /// A middle of a side is as good a station as a corner of this angle.
-const MIDDLE: f64 = 2.6; // 150 degrees
+const MIDDLE: f64 = 2.3; // 130 degrees
 /// Wider corners are no better stations.
 const WIDE: f64 = 3.5; // 200 degrees
 /// What each side costs that one part has more than the other.

@@ -17,6 +17,7 @@ pub(crate) fn choose(refiner: &Refiner, least_area: f64) -> (Vec<RegionId>, usiz
     loop {
         let mut changed = keep_largest_component(refiner, &mut region, count, least_area);
         changed |= open_pinches(refiner, &mut region);
+        changed |= cut_teeth(refiner, &mut region);
         if !changed {
             break;
         }
@@ -67,6 +68,47 @@ fn keep_largest_component(refiner: &Refiner, region: &mut [RegionId], count: usi
     }
     changed
 }
+
+/// Hands back faces that stick out of a region into surface that goes on smoothly: detection stops at faces, and its
+/// borders are ragged there. A true corner of a region has sharp edges.
+fn cut_teeth(refiner: &Refiner, region: &mut [RegionId]) -> bool {
+    let mesh = &refiner.part().mesh;
+    let smooth = |h: HalfEdgeId| {
+        let (m, n) = (mesh.area_vector(h.face()), mesh.area_vector(refiner.twin(h).face()));
+        m.cross(n).length().atan2(m.dot(n)) < SMOOTH
+    };
+    let mut changed = false;
+    for f in mesh.faces() {
+        let own = region[f.index()];
+        if !own.is_some() {
+            continue;
+        }
+        let open = |k: usize| {
+            let h = HalfEdgeId::of(f, k);
+            let beyond = refiner.twin(h).face();
+            region[beyond.index()] != own
+        };
+        let tooth = (0..3).any(|k| {
+            let (into, out) = (HalfEdgeId::of(f, (k + 2) % 3), HalfEdgeId::of(f, k));
+            if !(open((k + 2) % 3) && open(k) && smooth(into) && smooth(out)) {
+                return false;
+            }
+            let at = mesh.position(mesh.origin(out));
+            let (a, b) = (mesh.position(mesh.target(out)) - at, mesh.position(mesh.origin(into)) - at);
+            a.cross(b).length().atan2(a.dot(b)) < TOOTH
+        });
+        if tooth {
+            region[f.index()] = RegionId::NONE;
+            changed = true;
+        }
+    }
+    changed
+}
+
+/// The surface goes on smoothly where it turns by less than this.
+const SMOOTH: f64 = 0.35; // 20 degrees
+/// A single face is a tooth with a tip narrower than this.
+const TOOTH: f64 = 1.75; // 100 degrees
 
 /// At each vertex where a region has more than one fan, hands back all but the widest.
 fn open_pinches(refiner: &Refiner, region: &mut [RegionId]) -> bool {
