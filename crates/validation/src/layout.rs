@@ -2,7 +2,7 @@
 
 use crate::{LayoutFigures, ValidationError, topology};
 use std::collections::BTreeMap;
-use topipe_mesh::DVec3;
+use std::f64::consts::{PI, TAU};
 use topipe_quad_matching::{QuadLayout, Side};
 
 fn check(layout: &QuadLayout) -> Result<(), ValidationError> {
@@ -44,21 +44,18 @@ pub(crate) fn figures(layout: &QuadLayout) -> Result<LayoutFigures, ValidationEr
     for valence in layout.valences() {
         *valences.entry(valence).or_insert(0) += 1;
     }
+    let angles = corner_angles(layout);
     Ok(LayoutFigures {
         tiles: layout.tiles,
         macro_triangles: layout.macro_triangles,
         quads: layout.quads.len(),
         genus: genus(layout),
         valences,
-        max_corner_angle_deg: max_corner_angle(layout),
-        min_scaled_jacobian: (0..layout.quads.len())
-            .map(|quad| scaled_jacobian(layout.corners(quad).map(|v| corner(layout, v))))
-            .fold(1.0, f64::min),
+        max_corner_angle_deg: angles.iter().flatten().fold(0.0, |a, &b| a.max(b)).to_degrees(),
+        min_corner_angle_deg: angles.iter().flatten().fold(TAU, |a, &b| a.min(b)).to_degrees(),
+        irregular_quads: angles.iter().filter(|corners| corners.iter().any(|&a| !regular(a))).count(),
+        min_scaled_jacobian: angles.iter().flatten().map(|&a| scaled_jacobian(a)).fold(1.0, f64::min),
     })
-}
-
-fn corner(layout: &QuadLayout, vertex: u32) -> DVec3 {
-    layout.part.mesh.position(layout.vertices[vertex as usize])
 }
 
 /// `None` unless each edge has two sides in opposite directions and the sides of each quad and region face form loops.
@@ -70,8 +67,21 @@ fn genus(layout: &QuadLayout) -> Option<i64> {
     crate::surface::count_complex(layout.vertices.len(), &ends, quads.chain(faces)).genus
 }
 
-/// The largest sum of the angles of a quad's faces at one of its corners, degrees.
-fn max_corner_angle(layout: &QuadLayout) -> f64 {
+/// A corner at which a patch is regular: 15 to 165 degrees.
+fn regular(angle: f64) -> bool {
+    (PI / 12.0..=11.0 * PI / 12.0).contains(&angle)
+}
+
+/// The scaled Jacobian of a patch at a corner, from the angle of its two sides there: the length of the cross product of
+/// the unit tangents of the sides, negative where the corner is reflex and the patch folds over. Chords between the
+/// corners of a quad say little on a curved surface: a patch around half a strut has sides of any direction, and is
+/// regular all the same.
+fn scaled_jacobian(angle: f64) -> f64 {
+    angle.min(1.5 * PI).sin()
+}
+
+/// The angles at the corners of each quad, radians: the sums of the angles of its faces there.
+fn corner_angles(layout: &QuadLayout) -> Vec<[f64; 4]> {
     let mesh = &layout.part.mesh;
     let mut angle_at: BTreeMap<(u32, u32), f64> = BTreeMap::new();
     for quad in 0..layout.quads.len() {
@@ -93,19 +103,11 @@ fn max_corner_angle(layout: &QuadLayout) -> f64 {
             }
         }
     }
-    angle_at.values().fold(0.0f64, |a, &b| a.max(b)).to_degrees()
-}
-
-/// The smallest, over the corners, of the triple product of the two sides (as unit vectors) and the mean normal.
-fn scaled_jacobian(corners: [DVec3; 4]) -> f64 {
-    let normal = (corners[2] - corners[0]).cross(corners[3] - corners[1]).normalize_or_zero();
-    (0..4)
-        .map(|k| {
-            let ahead = (corners[(k + 1) % 4] - corners[k]).normalize_or_zero();
-            let back = (corners[(k + 3) % 4] - corners[k]).normalize_or_zero();
-            ahead.cross(back).dot(normal)
+    (0..layout.quads.len())
+        .map(|quad| {
+            layout.corners(quad).map(|v| angle_at[&(layout.vertices[v as usize].0, quad as u32)])
         })
-        .fold(f64::INFINITY, f64::min)
+        .collect()
 }
 
 #[cfg(test)]
@@ -113,11 +115,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scaled_jacobian_of_known_quads() {
-        let of = |c: [[f64; 2]; 4]| scaled_jacobian(c.map(|[x, y]| DVec3::new(x, y, 3.0)));
-        assert!((of([[0., 0.], [2., 0.], [2., 1.], [0., 1.]]) - 1.0).abs() < 1e-15);
-        let sheared = of([[0., 0.], [1., 0.], [2., 1.], [1., 1.]]);
-        assert!((sheared - 0.5f64.sqrt()).abs() < 1e-12, "{sheared}");
-        assert!(of([[0., 0.], [2., 0.], [0.5, 0.5], [0., 2.]]) < 0.0, "a reflex corner");
+    fn scaled_jacobian_of_known_corners() {
+        let of = |degrees: f64| scaled_jacobian(degrees.to_radians());
+        assert!((of(90.0) - 1.0).abs() < 1e-15);
+        assert!((of(45.0) - 0.5f64.sqrt()).abs() < 1e-15);
+        assert!(of(180.0).abs() < 1e-15);
+        assert!(of(200.0) < 0.0 && of(350.0) == -1.0, "a reflex corner");
+        assert!(regular(15.1f64.to_radians()) && !regular(165.1f64.to_radians()));
     }
 }

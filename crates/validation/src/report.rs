@@ -190,8 +190,12 @@ pub struct LayoutFigures {
     pub valences: BTreeMap<u32, usize>,
     /// Largest corner of a quad, measured on the mesh: the angles of its faces there, summed.
     pub max_corner_angle_deg: f64,
-    /// Smallest scaled Jacobian of the quads with straight sides: 1 for a rectangle, 0 and below for a quad that is
-    /// folded.
+    /// Smallest corner, measured likewise.
+    pub min_corner_angle_deg: f64,
+    /// Quads with a corner outside 15 to 165 degrees.
+    pub irregular_quads: usize,
+    /// Smallest scaled Jacobian at the corners of quads: the cross product of the unit tangents of the two sides, the
+    /// sine of the corner. 1 for a right angle, 0 at 180 degrees, negative for a reflex corner, where a patch folds over.
     pub min_scaled_jacobian: f64,
 }
 
