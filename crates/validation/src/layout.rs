@@ -104,9 +104,7 @@ fn corner_angles(layout: &QuadLayout) -> Vec<[f64; 4]> {
         }
     }
     (0..layout.quads.len())
-        .map(|quad| {
-            layout.corners(quad).map(|v| angle_at[&(layout.vertices[v as usize].0, quad as u32)])
-        })
+        .map(|quad| layout.corners(quad).map(|v| angle_at[&(layout.vertices[v as usize].0, quad as u32)]))
         .collect()
 }
 

@@ -16,7 +16,7 @@ use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
 /// Rounds after which it gives up. Cutting needs a few; lenses may ask for some more.
 const MOST_ROUNDS: usize = 60;
 /// Rounds in which lenses are joined to a neighbour; later neighbours are cut.
-const JOIN_ROUNDS: usize = 20;
+const JOIN_ROUNDS: usize = 8;
 
 impl Construction<'_> {
     /// Cuts until all tiles are disks with simple borders and three corners. Returns the tiles that can not be helped
@@ -26,6 +26,7 @@ impl Construction<'_> {
         for round in 0..MOST_ROUNDS {
             self.progress.check()?;
             held.clear();
+            let mut open = Vec::new();
             let mut by_tile = self.faces_by_tile();
             let is_corner = self.corner_vertices();
             let mut stamps = Stamps::new(is_corner.len());
@@ -39,6 +40,9 @@ impl Construction<'_> {
                 let surface = &self.surface;
                 // Faces that were split since still belong to it; they are looked at in the next round.
                 let found = outline(surface, &faces, |h| surface.is_border(h), &is_corner, &mut stamps);
+                if !matches!(&found, Ok(outline) if outline.corners.len() >= 3) {
+                    open.push(tile);
+                }
                 match found {
                     Err(fault) => {
                         let parted = match fault {
@@ -66,6 +70,9 @@ impl Construction<'_> {
             }
             if changes == 0 {
                 return Ok(held);
+            }
+            if round + 1 == MOST_ROUNDS {
+                held.append(&mut open);
             }
             self.progress.remark(&format!("cutting, round {round}: {changes} tiles changed"));
         }
@@ -188,9 +195,18 @@ impl Construction<'_> {
         busy: &[bool],
         join: bool,
     ) -> Lens {
-        // An island in another tile: that one is no disk and is cut.
-        let [0, second] = corners[..] else { return Lens::Later };
         let surface = &self.surface;
+        let [first, second] = corners[..] else {
+            // An island in another tile, or one of two tiles that make a sphere: cut across, it gives corners to both.
+            let ends = [border[0].face(), border[border.len() / 2].face()];
+            if ends[0] == ends[1] {
+                self.surface.split_face(ends[0]);
+            } else {
+                self.take(tile, &[(0, ends[0]), (1, ends[1])]);
+            }
+            return Lens::Changed;
+        };
+        debug_assert_eq!(first, 0);
         let sides = [&border[..second], &border[second..]];
         let across = |side: &[HalfEdgeId]| surface.owner[surface.refiner.twin(side[0]).face().index()];
         let length = |side: &[HalfEdgeId]| side.iter().map(|&h| surface.length(h)).sum::<f64>();
