@@ -51,7 +51,7 @@ pub(crate) fn figures(layout: &QuadLayout) -> Result<LayoutFigures, ValidationEr
         quads: layout.quads.len(),
         genus: genus(layout),
         valences,
-        max_corner_angle_deg: angles.iter().flatten().fold(0.0, |a, &b| a.max(b)).to_degrees(),
+        max_corner_angle_deg: angles.iter().flatten().fold(0.0f64, |a, &b| a.max(b)).to_degrees(),
         min_corner_angle_deg: angles.iter().flatten().fold(TAU, |a, &b| a.min(b)).to_degrees(),
         irregular_quads: angles.iter().filter(|corners| corners.iter().any(|&a| !regular(a))).count(),
         min_scaled_jacobian: angles.iter().flatten().map(|&a| scaled_jacobian(a)).fold(1.0, f64::min),
