@@ -49,6 +49,7 @@ mod error;
 pub mod features;
 mod finish;
 mod kernel;
+mod locality;
 mod methods;
 mod outline;
 mod parameters;

@@ -4,11 +4,12 @@ use crate::alpha;
 use crate::features::{self, Features};
 use crate::finish::{Finish, Mended};
 use crate::kernel::{Domain, Slide, change};
+use crate::locality::Order;
 use crate::methods;
 use crate::outline::OutlineGuard;
 use crate::volume::VolumeKeeper;
 use crate::{Method, Parameters, SmoothingError};
-use topipe_mesh::{Connectivity, DVec3, Design, FeatureKind, Part, RegionId, SmoothingRecord};
+use topipe_mesh::{Connectivity, DVec3, Design, FeatureKind, Part, RegionId, SmoothingRecord, TriangleMesh};
 use topipe_progress::Progress;
 
 /// A step longer than this many mean edge lengths (root mean square) is no smoothing any more.
@@ -23,7 +24,7 @@ const DIVERGED: f64 = 100.0;
 ///
 /// See the [crate] for guarantees.
 pub fn smooth(part: &Part, parameters: &Parameters, progress: &Progress) -> Result<Part, SmoothingError> {
-    smooth_observed(part, parameters, progress, &mut |_, _, _| false)
+    smooth_observed(part, parameters, progress, None)
 }
 
 /// Is shown the positions before and after an iteration and the volume after it; says whether to stop.
@@ -34,7 +35,7 @@ pub(crate) fn smooth_observed(
     part: &Part,
     parameters: &Parameters,
     progress: &Progress,
-    observe: &mut Observer<'_>,
+    observe: Option<&mut Observer<'_>>,
 ) -> Result<Part, SmoothingError> {
     parameters.check()?;
     check_attributes(part)?;
@@ -72,7 +73,14 @@ pub(crate) fn smooth_observed(
     features.measure(&result.mesh);
     result.feature_edges =
         part.feature_edges.iter().filter(|e| e.kind == FeatureKind::User).copied().collect();
-    for edge in features::feature_edges(&result.mesh, &connectivity, &features, &solid, parameters) {
+    // Between faces of which nothing is known no edge is a feature.
+    let known = !features.regions.is_empty() || solid.contains(&true);
+    let edges = if known {
+        features::feature_edges(&result.mesh, &connectivity, &features, &solid, parameters)
+    } else {
+        Vec::new()
+    };
+    for edge in edges {
         if !part.feature_edges.iter().any(|e| e.kind == FeatureKind::User && e.vertices == edge.vertices) {
             result.feature_edges.push(edge);
         }
@@ -188,7 +196,7 @@ fn iterate(
     parameters: &Parameters,
     progress: &Progress,
     record: &mut SmoothingRecord,
-    observe: &mut Observer<'_>,
+    observe: Option<&mut Observer<'_>>,
 ) -> Result<Vec<DVec3>, SmoothingError> {
     let Setup { part, connectivity, features, domain } = *setup;
     let mesh = &part.mesh;
@@ -215,8 +223,77 @@ fn iterate(
         }
     }
     let parameters = &settle_alpha(parameters, domain, original, edge, progress);
-    let mut step = methods::choose(parameters, domain, original);
     let guard = OutlineGuard::new(mesh, features, domain);
+    let order = Order::along_curve(mesh);
+    let mut current = match &order {
+        None => run(
+            &Run { mesh, domain, guard: &guard, edge, free, order: None },
+            &mut keeper,
+            parameters,
+            progress,
+            record,
+            observe,
+        )?,
+        Some(order) => {
+            let (mesh, domain) = (order.mesh(mesh), order.domain(domain));
+            let guard = guard.renumbered(|v| order.new_number(v));
+            let mut keeper = VolumeKeeper::new(&mesh, &domain);
+            let setup = Run { mesh: &mesh, domain: &domain, guard: &guard, edge, free, order: Some(order) };
+            order.undo(&run(&setup, &mut keeper, parameters, progress, record, observe)?)
+        }
+    };
+    if parameters.method != Method::Contract {
+        let finish = Finish {
+            mesh,
+            connectivity,
+            domain,
+            guard: &guard,
+            slides: {
+                let mut slides = vec![false; mesh.vertex_count()];
+                domain.slides.iter().for_each(|s| slides[s.vertex as usize] = true);
+                slides
+            },
+            spike: parameters.spike_angle.to_radians().cos(),
+            spikes: parameters.spike_angle < 180.0,
+            embedded: parameters.keep_embedded,
+            keep_volume: parameters.keeps_volume(),
+            edge,
+        };
+        let mended = finish.mend(&mut current, &mut keeper, progress)?;
+        if mended != Mended::default() {
+            progress.remark(&format!(
+                "{} edges were sharper than `spike_angle`, {} still are; {} pairs of triangles passed through each other \
+                 and were parted",
+                mended.spikes_before, mended.spikes_after, mended.crossings
+            ));
+        }
+    }
+    record.total_change = change(original, &current).distances;
+    Ok(current)
+}
+
+/// What the iteration works on, in its own numbering.
+struct Run<'a> {
+    mesh: &'a TriangleMesh,
+    domain: &'a Domain,
+    guard: &'a OutlineGuard,
+    edge: f64,
+    free: usize,
+    order: Option<&'a Order>,
+}
+
+/// The iteration itself.
+fn run(
+    setup: &Run<'_>,
+    keeper: &mut VolumeKeeper,
+    parameters: &Parameters,
+    progress: &Progress,
+    record: &mut SmoothingRecord,
+    mut observe: Option<&mut Observer<'_>>,
+) -> Result<Vec<DVec3>, SmoothingError> {
+    let Run { mesh, domain, guard, edge, free, order } = *setup;
+    let original = &mesh.positions;
+    let mut step = methods::choose(parameters, domain, original);
     let mut current = original.clone();
     let mut next = original.clone();
     let most = parameters.most_iterations();
@@ -246,37 +323,14 @@ fn iterate(
         if !rms.is_finite() || rms > DIVERGED {
             return Err(SmoothingError::Diverged { iteration, step: rms });
         }
-        if observe(&next, &current, volume) || rms < parameters.tolerance {
+        let stop = observe.as_mut().is_some_and(|observe| match order {
+            None => observe(&next, &current, volume),
+            Some(order) => observe(&order.undo(&next), &order.undo(&current), volume),
+        });
+        if stop || rms < parameters.tolerance {
             record.converged = true;
             break;
         }
     }
-    if parameters.method != Method::Contract {
-        let finish = Finish {
-            mesh,
-            connectivity,
-            domain,
-            guard: &guard,
-            slides: {
-                let mut slides = vec![false; mesh.vertex_count()];
-                domain.slides.iter().for_each(|s| slides[s.vertex as usize] = true);
-                slides
-            },
-            spike: parameters.spike_angle.to_radians().cos(),
-            spikes: parameters.spike_angle < 180.0,
-            embedded: parameters.keep_embedded,
-            keep_volume: parameters.keeps_volume(),
-            edge,
-        };
-        let mended = finish.mend(&mut current, &mut keeper, progress)?;
-        if mended != Mended::default() {
-            progress.remark(&format!(
-                "{} edges were sharper than `spike_angle`, {} still are; {} pairs of triangles passed through each other \
-                 and were parted",
-                mended.spikes_before, mended.spikes_after, mended.crossings
-            ));
-        }
-    }
-    record.total_change = change(original, &current).distances;
     Ok(current)
 }

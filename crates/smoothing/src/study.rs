@@ -265,20 +265,20 @@ fn run(
 ) -> Result<(Part, History), SmoothingError> {
     let mut history = History::default();
     let original = &part.mesh.positions;
-    let result =
-        smooth_observed(part, settings, progress, &mut |before: &[DVec3], after: &[DVec3], volume| {
-            let total: f64 = original.iter().zip(after).map(|(a, b)| a.distance(*b)).sum();
-            let (mut step, mut squares) = (0.0, 0.0);
-            for (a, b) in before.iter().zip(after) {
-                let square = a.distance_squared(*b);
-                step += square.sqrt();
-                squares += square;
-            }
-            history.change.push(total);
-            history.cumulative.push(history.cumulative.last().copied().unwrap_or(0.0) + step);
-            history.volumes.push(volume);
-            history.distances.push(squares.sqrt());
-            squares.sqrt() < distance
-        })?;
+    let mut watch = |before: &[DVec3], after: &[DVec3], volume: f64| {
+        let total: f64 = original.iter().zip(after).map(|(a, b)| a.distance(*b)).sum();
+        let (mut step, mut squares) = (0.0, 0.0);
+        for (a, b) in before.iter().zip(after) {
+            let square = a.distance_squared(*b);
+            step += square.sqrt();
+            squares += square;
+        }
+        history.change.push(total);
+        history.cumulative.push(history.cumulative.last().copied().unwrap_or(0.0) + step);
+        history.volumes.push(volume);
+        history.distances.push(squares.sqrt());
+        squares.sqrt() < distance
+    };
+    let result = smooth_observed(part, settings, progress, Some(&mut watch))?;
     Ok((result, history))
 }

@@ -65,7 +65,10 @@ pub fn detect(
     progress: &Progress,
 ) -> Result<Features, SmoothingError> {
     let mesh = &part.mesh;
-    if parameters.method == Method::Contract {
+    let nothing_asked = !(parameters.detect_planes || parameters.detect_holes || parameters.detect_bosses)
+        && parameters.features.is_empty()
+        && part.regions.is_empty();
+    if parameters.method == Method::Contract || nothing_asked {
         // What contracts does not keep its shapes.
         return Ok(Features {
             regions: Vec::new(),

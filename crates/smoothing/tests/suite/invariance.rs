@@ -60,3 +60,40 @@ fn smoothing_does_not_depend_on_numbering() {
         assert_eq!(result.region_of_face[new].is_some(), plain.region_of_face[old].is_some());
     }
 }
+
+/// Large meshes are renumbered for the iteration; nobody may notice.
+#[test]
+fn a_large_mesh_is_smoothed_in_its_own_numbering() {
+    let mut mesh = crate::shapes::sphere(7, DVec3::new(3.0, -2.0, 1.0));
+    crate::shapes::shake(&mut mesh, 0.02, 4);
+    let part = Part::new(mesh);
+    let parameters = Parameters {
+        method: topipe_smoothing::Method::Laplacian,
+        lambda: 1.0,
+        iterations: Some(1),
+        detect_planes: false,
+        detect_holes: false,
+        detect_bosses: false,
+        spike_angle: 180.0,
+        ..Parameters::default()
+    };
+    let mut results = Vec::new();
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        results.push(pool.install(|| smoothed(&part, &parameters)));
+    }
+    assert!(results[0] == results[1]);
+    let mut sum = vec![DVec3::ZERO; part.mesh.vertex_count()];
+    let mut count = vec![0.0; part.mesh.vertex_count()];
+    for t in &part.mesh.triangles {
+        for k in 0..3 {
+            // Each edge runs in both directions once.
+            sum[t[k].index()] += part.mesh.position(t[(k + 1) % 3]);
+            count[t[k].index()] += 1.0;
+        }
+    }
+    for v in part.mesh.vertices() {
+        let mean = sum[v.index()] / count[v.index()];
+        assert!(results[0].mesh.position(v).distance(mean) < 1e-13);
+    }
+}

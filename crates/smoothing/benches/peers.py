@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+"""100 iterations of HC and of Taubin, beside trimesh, pymeshlab and VTK (pyvista), in one run.
+
+    python3 -m venv target/peers && target/peers/bin/pip install trimesh scipy pymeshlab pyvista
+    cargo build --release -p topipe-smoothing --example bench
+    target/peers/bin/python crates/smoothing/benches/peers.py [--sizes 128x64,1024x512] [--rounds 3] [--binary PATH]
+
+The meshes are tori with noise of a fifth of an edge, of 16,384 and of 1,048,576 triangles in random order.
+Programs take turns within a round, so that a slow spell of the machine hits all; the figures are medians over the rounds, and what counts is the ratio. Loading a file is not timed,
+building neighbours is: that is part of what each of them does per call. VTK has no HC and no Taubin: its windowed
+sinc with the pass band 0.1 stands beside Taubin. Figures of one such run stand in README.md beside this file.
+"""
+import argparse, json, os, statistics, struct, subprocess, sys, tempfile, time
+import numpy as np
+
+
+def torus(rings, sides):
+    u, v = np.meshgrid(np.arange(rings), np.arange(sides), indexing="ij")
+    a, b = 2 * np.pi * u / rings, 2 * np.pi * v / sides
+    p = np.stack([(30 + 10 * np.cos(b)) * np.cos(a), (30 + 10 * np.cos(b)) * np.sin(a), 10 * np.sin(b)], -1)
+    p = p.reshape(-1, 3)
+    n = lambda i, k: ((i % rings) * sides + k % sides).ravel()
+    q = [n(u, v), n(u + 1, v), n(u + 1, v + 1), n(u, v + 1)]
+    f = np.concatenate([np.stack([q[0], q[1], q[2]], -1), np.stack([q[0], q[2], q[3]], -1)])
+    edge = np.linalg.norm(p[f[:, 0]] - p[f[:, 1]], axis=1).mean()
+    p += np.random.default_rng(1).uniform(-0.2, 0.2, p.shape) * edge
+    # A file of a tetrahedral result has no order that favours anyone.
+    f = f[np.random.default_rng(2).permutation(len(f))]
+    return p.astype(np.float32).astype(float), f
+
+
+def stl(path, p, f):
+    record = np.zeros(len(f), dtype=[("n", "<3f4"), ("v", "<9f4"), ("a", "<u2")])
+    record["v"] = p[f].reshape(len(f), 9)
+    with open(path, "wb") as out:
+        out.write(b"\0" * 80 + struct.pack("<I", len(f)))
+        record.tofile(out)
+
+
+def peers(p, f, n):
+    runs = {}
+    try:
+        import trimesh
+
+        def fresh():
+            return trimesh.Trimesh(p.copy(), f.copy(), process=False)
+
+        runs["hc", "trimesh"] = lambda: trimesh.smoothing.filter_humphrey(fresh(), alpha=0.0, beta=0.5, iterations=n)
+        runs["taubin", "trimesh"] = lambda: trimesh.smoothing.filter_taubin(fresh(), lamb=0.5, nu=0.53, iterations=2 * n)
+    except ImportError:
+        print("trimesh is missing", file=sys.stderr)
+    try:
+        import pymeshlab
+
+        def meshset():
+            ms = pymeshlab.MeshSet()
+            ms.add_mesh(pymeshlab.Mesh(p, f))
+            return ms
+
+        runs["taubin", "pymeshlab"] = lambda: meshset().apply_coord_taubin_smoothing(lambda_=0.5, mu=-0.53, stepsmoothnum=n)
+
+        def hc():
+            ms = meshset()
+            # Its filter makes one iteration per call.
+            for _ in range(n):
+                ms.apply_coord_hc_laplacian_smoothing()
+
+        if len(f) < 100_000:
+            runs["hc", "pymeshlab"] = hc
+    except ImportError:
+        print("pymeshlab is missing", file=sys.stderr)
+    try:
+        import pyvista
+
+        mesh = pyvista.PolyData(p, np.hstack([np.full((len(f), 1), 3), f]).ravel())
+        runs["taubin", "vtk windowed sinc"] = lambda: mesh.smooth_taubin(n_iter=n, pass_band=0.1)
+    except ImportError:
+        print("pyvista is missing", file=sys.stderr)
+    return runs
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("--sizes", default="128x64,1024x512", help="rings x sides of the tori")
+    arguments.add_argument("--rounds", type=int, default=3)
+    arguments.add_argument("--iterations", type=int, default=100)
+    arguments.add_argument("--binary", default="target/release/examples/bench")
+    options = arguments.parse_args()
+    for size in options.sizes.split(","):
+        p, f = torus(*map(int, size.split("x")))
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "torus.stl")
+            stl(path, p, f)
+            runs = peers(p, f, options.iterations)
+            times, ours = {}, {}
+            for _ in range(options.rounds):
+                for method in ["hc", "taubin"]:
+                    out = subprocess.run([options.binary, path, method, str(options.iterations)], capture_output=True, check=True)
+                    ours.setdefault(method, []).append(json.loads(out.stdout))
+                for key, run in runs.items():
+                    start = time.perf_counter()
+                    run()
+                    times.setdefault(key, []).append(time.perf_counter() - start)
+        print(f"{len(f)} triangles, {options.iterations} iterations, median of {options.rounds}")
+        for method, rows in ours.items():
+            median = lambda key: statistics.median(r[key] for r in rows)
+            seconds = median("seconds")
+            print(f"  {method:7} topipe             {seconds:8.3f} s   least by bandwidth {median('least_seconds'):.3f} s "
+                  f"({median('bandwidth_gb_s'):.1f} GB/s)   peak {median('peak_mb'):.0f} MB   volume {median('volume_error'):+.1e}")
+            for (m, who), t in times.items():
+                if m == method:
+                    t = statistics.median(t)
+                    print(f"  {method:7} {who:18} {t:8.3f} s   {t / seconds:5.1f} x")
+
+
+main()
