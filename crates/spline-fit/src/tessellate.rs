@@ -5,19 +5,23 @@
 
 mod trimmed;
 
-use crate::{CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface};
+use crate::{Basis, CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface};
 use topipe_mesh::{DVec3, RegionShape, TriangleMesh, VertexId};
 
 /// Divisions of one edge or one side of a patch's grid at the most: finer than that is a tolerance out of reach.
 const MOST: usize = 256;
 
-/// Number of equal pieces into which a curve with these control points must be divided: the distance of a curve
-/// from its chords is at most |second derivative| / 8 over the square of the number.
-fn divisions(control: impl Iterator<Item = DVec3>, degree: usize, spans: usize, tolerance: f64) -> usize {
+/// Number of equal pieces into which a curve must be divided: the distance of a curve from its chords is at most
+/// |second derivative| / 8 over the square of the number, and the control points of the second derivative bound it.
+fn divisions(basis: &Basis, control: impl Iterator<Item = DVec3>, tolerance: f64) -> usize {
+    let (p, knots) = (basis.degree(), basis.knots());
     let points: Vec<DVec3> = control.collect();
-    let bend = points.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).length()).fold(0.0, f64::max);
-    // Second differences of control points bound the second derivative up to the square of the span count.
-    let second = bend * (degree * (degree - 1)) as f64 * (spans * spans) as f64;
+    // Where knots coincide the derivative jumps, and there is nothing to divide.
+    let ratio = |d: DVec3, length: f64| if length > 0.0 { d / length } else { DVec3::ZERO };
+    let slope = |i: usize| p as f64 * ratio(points[i + 1] - points[i], knots[i + p + 1] - knots[i + 1]);
+    let second = (0..points.len().saturating_sub(2))
+        .map(|i| (p - 1) as f64 * ratio(slope(i + 1) - slope(i), knots[i + p + 1] - knots[i + 2]).length())
+        .fold(0.0, f64::max);
     ((second / (8.0 * tolerance)).sqrt().ceil() as usize).clamp(1, MOST)
 }
 
@@ -31,8 +35,7 @@ fn edge_divisions(edge: &EdgeCurve, tolerance: f64) -> usize {
             (sweep / widest(radius, tolerance)).ceil().clamp(least, 4.0 * MOST as f64) as usize
         }
         _ => {
-            let spans = edge.basis.breaks().len() - 1;
-            let count = divisions(edge.control.iter().copied(), edge.basis.degree(), spans, tolerance);
+            let count = divisions(&edge.basis, edge.control.iter().copied(), tolerance);
             count.max(if edge.ends[0] == edge.ends[1] { 3 } else { 1 })
         }
     }
@@ -142,17 +145,16 @@ impl SplineSurface {
 
 fn grid_size(patch: &Patch, sides: &[Vec<VertexId>], tolerance: f64) -> (usize, usize) {
     let (nu, nv) = (patch.basis_u.len(), patch.basis_v.len());
-    let spans = |breaks: usize| breaks - 1;
     let along_u = (0..nv)
         .map(|j| {
             let row = patch.control[j * nu..(j + 1) * nu].iter().copied();
-            divisions(row, patch.basis_u.degree(), spans(patch.basis_u.breaks().len()), tolerance)
+            divisions(&patch.basis_u, row, tolerance)
         })
         .fold(2, usize::max);
     let along_v = (0..nu)
         .map(|i| {
             let column = (0..nv).map(|j| patch.control[j * nu + i]);
-            divisions(column, patch.basis_v.degree(), spans(patch.basis_v.breaks().len()), tolerance)
+            divisions(&patch.basis_v, column, tolerance)
         })
         .fold(2, usize::max);
     let longest = |a: usize, b: usize| (sides[a].len() - 1).max(sides[b].len() - 1);
