@@ -1,8 +1,9 @@
 //! One timed run for the comparison with other programs; see `benches/peers.py`, which calls it.
 //!
-//! `bench MESH.stl METHOD ITERATIONS` prints one line of JSON: seconds for connectivity and all iterations (nothing
+//! `bench MESH.stl METHOD ITERATIONS [RESULT.off]` prints one line of JSON: seconds for connectivity and all iterations (nothing
 //! detected, nothing frozen), the volume error, the bandwidth of the machine's memory by a triad (`a = b + s c` over
-//! arrays far larger than any cache) right before, what the iterations at least have to move, and the peak memory.
+//! arrays far larger than any cache) in the same run, what the iterations at least have to move, and the peak memory.
+//! METHOD `default` takes all defaults of the stage. With a fourth argument the result is written, for its shape.
 
 use rayon::prelude::*;
 use std::time::Instant;
@@ -40,10 +41,11 @@ fn peak() -> f64 {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [path, method, iterations] = &arguments[..] else {
-        eprintln!("bench MESH.stl METHOD ITERATIONS");
+    let ([path, method, iterations] | [path, method, iterations, _]) = &arguments[..] else {
+        eprintln!("bench MESH.stl METHOD ITERATIONS [RESULT.off]");
         std::process::exit(2);
     };
+    let defaults = method == "default";
     let (method, alpha, mu) = match method.as_str() {
         "hc" => (Method::Hc, Some(0.0), -0.6732),
         "taubin" => (Method::Taubin, None, -0.53),
@@ -73,10 +75,15 @@ fn main() {
         keep_embedded: false,
         ..Parameters::default()
     };
+    let parameters = if defaults { Parameters::default() } else { parameters };
     let start = Instant::now();
     let result = smooth(&part, &parameters, &Progress::silent()).expect("smoothed");
     let seconds = start.elapsed().as_secs_f64();
     let memory = peak();
+    if let Some(path) = arguments.get(3) {
+        let mut file = std::io::BufWriter::new(std::fs::File::create(path).expect("a writable file"));
+        topipe_mesh::write::off(&result.mesh, &mut file).expect("a writable file");
+    }
     // Two passes, each: read and write the positions, read one more array of the size, the rows and their starts.
     let (v, e) = (
         part.mesh.vertex_count() as f64,

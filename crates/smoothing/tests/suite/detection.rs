@@ -135,6 +135,22 @@ fn detection_does_not_depend_on_orientation_or_unit() {
 }
 
 #[test]
+fn holes_are_found_in_any_orientation_and_unit() {
+    for (k, case) in ["bracket", "beam-two-holes", "bell-crank", "support"].into_iter().enumerate() {
+        let part = read(case);
+        let wanted = facts(case)["holes"].as_array().expect("holes").len();
+        let mut noise = Noise(20 + k as u64);
+        for scale in [1e-3, 0.37, 1e3] {
+            let axis = DVec3::new(noise.next(), noise.next(), noise.next()).normalize();
+            let turn = glam::DQuat::from_axis_angle(axis, 3.0 * noise.next());
+            let mut turned = part.clone();
+            turned.mesh.positions.iter_mut().for_each(|p| *p = turn * (scale * *p));
+            assert_eq!(diameters(&found(&turned).regions).len(), wanted, "{case} at scale {scale}");
+        }
+    }
+}
+
+#[test]
 fn holes_survive_noise_on_the_free_surface() {
     for case in ["bracket", "beam-two-holes", "bell-crank", "support"] {
         let mut part = read(case);
