@@ -15,7 +15,7 @@ fn main() -> ExitCode {
         [mesh, labels, method] => (mesh, labels, method, None),
         [mesh, labels, method, smoothed] => (mesh, labels, method, Some(smoothed.as_str())),
         _ => {
-            eprintln!("usage: skeletonize MESH LABELS.csv|- identifier-box|marching-sections [SMOOTHED.off]");
+            eprintln!("usage: skeletonize MESH LABELS.csv|- METHOD [SMOOTHED.off]");
             return ExitCode::from(2);
         }
     };
@@ -55,6 +55,8 @@ fn run(mesh: &str, labels: &str, method: &str, smoothed: Option<&str>) -> Result
     }
     let method = match method {
         "identifier-box" => Method::IdentifierBox,
+        "mean-curvature-flow" => Method::MeanCurvatureFlow,
+        "laplacian-contraction" => Method::LaplacianContraction,
         _ => Method::MarchingSections,
     };
     let parameters = Parameters { method, ..Parameters::default() };

@@ -1,10 +1,12 @@
 //! Curve skeletons of beam-like parts.
 //!
-//! Two methods, see [`Method`]:
+//! Four methods, see [`Method`]:
 //! - `identifier-box`: the axis-aligned box that marches from the borders of design and non-design and collects
 //!   nodes (the thesis on skeletonization of beam-like topology optimization results, section 3.4), in its plain form.
 //! - `marching-sections`: plane sections across the branches of the Reeb graph of the geodesic distance from the
 //!   interfaces, each point at the area centroid of its section, junctions where the axes of their branches meet.
+//! - `mean-curvature-flow` and `laplacian-contraction`: what the thesis compares with, so that its tables can be
+//!   recomputed; neither depends on the axes, neither gives sections.
 //!
 //! Guarantees: an oriented closed mesh gives a skeleton or a named error, never a panic, in a bounded number of
 //! steps; equal input gives equal bytes for any number of threads. Each interface has one point, and the interfaces
@@ -23,6 +25,7 @@
 //! assert_eq!(result, Err(SkeletonError::Empty));
 //! ```
 
+mod contraction;
 mod error;
 mod identifier_box;
 mod inside;
@@ -30,6 +33,7 @@ mod interface;
 mod marching_sections;
 mod non_design;
 mod parameters;
+mod piece;
 mod skeleton;
 mod torsion;
 pub mod write;
@@ -78,6 +82,9 @@ pub fn skeletonize(
     let mut skeleton = match parameters.method {
         Method::IdentifierBox => {
             identifier_box::skeletonize(&part, parameters, &connectivity, &sets, progress)
+        }
+        Method::MeanCurvatureFlow | Method::LaplacianContraction => {
+            contraction::skeletonize(&part, parameters.method, &connectivity, &sets, progress)
         }
         Method::MarchingSections => {
             marching_sections::skeletonize(&part, parameters, &connectivity, &sets, progress)

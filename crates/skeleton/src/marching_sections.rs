@@ -1,6 +1,6 @@
 //! Our method: plane sections along the branches of the Reeb graph of the distance from the interfaces.
 //!
-//! 1. Each design set is cut out and its interfaces closed ([`piece`]), so that it is a closed surface.
+//! 1. Each design set is cut out and its interfaces closed ([`Piece`]), so that it is a closed surface.
 //! 2. The geodesic distance from all interfaces, or from a far tip where there are none ([`geodesic`]), gives a Reeb
 //!    graph with one cycle per handle ([`reeb`]): the graph of the skeleton is right before any point is.
 //! 3. Bumps are removed and chains joined ([`branches`]); no step from here on changes the number of cycles.
@@ -13,12 +13,12 @@
 //! Centeredness (36 rays in the section, over the radius of the bounding sphere) on the fixtures after 10 Taubin
 //! iterations and 5 of contraction, by points and by length; none is outside, and cycles equal the genus:
 //!
-//! | | by points | by length | identifier-box, by points |
-//! |---|---|---|---|
-//! | cantilever | 0.0040 | 0.0041 | BOX_CANTILEVER |
-//! | cantilever-four | 0.0034 | 0.0035 | BOX_FOUR |
-//! | y-form | 0.0038 | 0.0037 | BOX_Y |
-//! | monster-lite | 0.0050 | 0.0051 | BOX_MONSTER |
+//! | | by points | by length | identifier-box | mean curvature flow | Laplacian contraction |
+//! |---|---|---|---|---|---|
+//! | cantilever | 0.0040 | 0.0041 | 0.0224 | 0.0154 | 0.0323 |
+//! | cantilever-four | 0.0034 | 0.0035 | 0.0231 | 0.0090 | 0.0170 |
+//! | y-form | 0.0038 | 0.0037 | 0.0166 | 0.0106 | 0.0147 |
+//! | monster-lite | 0.0050 | 0.0051 | 0.0171 | 0.0185 | 0.0385 |
 //!
 //! On the frame of seven round beams, away from its nodes, points are 0.0041 mm (rms) off the true axes and E_center is
 //! 0.0007; junctions are less than 0.3 mm from where the axes meet.
@@ -31,18 +31,17 @@ mod branches;
 mod emit;
 mod geodesic;
 mod junction;
-mod piece;
 mod reeb;
 mod section;
 
 use crate::inside::Inside;
 use crate::interface::Sets;
+use crate::piece::Piece;
 use crate::skeleton::{PointKind, Section, Skeleton};
 use crate::{Method, Parameters, SkeletonError, non_design};
 use axis::Axis;
 use branches::{Branch, BranchGraph, NodeKind};
 use glam::DVec3;
-use piece::Piece;
 use rayon::prelude::*;
 use reeb::ReebGraph;
 use section::Cutter;

@@ -14,13 +14,17 @@ pub enum Method {
     MarchingSections,
     /// The axis-aligned box that marches from the interfaces, as in the thesis: needs labels, depends on the axes.
     IdentifierBox,
+    /// Method 1 of the thesis: mean curvature flow towards the medial axis, for comparison.
+    MeanCurvatureFlow,
+    /// Method 2 of the thesis: Laplacian contraction and farthest-point sampling, for comparison.
+    LaplacianContraction,
 }
 
 /// Parameters of the skeleton. All are ratios, so they hold at any size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Parameters {
-    /// `marching-sections` or `identifier-box`.
+    /// `marching-sections`, `identifier-box`, `mean-curvature-flow` or `laplacian-contraction`.
     pub method: Method,
     /// identifier-box: edge length of the box over the smaller width of the interface. Source: eq. 3.1 (one half).
     pub box_factor: f64,

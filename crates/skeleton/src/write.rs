@@ -3,6 +3,11 @@
 use crate::{Section, Skeleton};
 use std::io::{self, Write};
 
+/// Area, normal, second moments, torsion constant.
+type Plane = (f64, glam::DVec3, [f64; 2], f64);
+/// One column of data.
+type Value = fn(Plane) -> f64;
+
 /// VTP, in text: a line per edge; at the points the kind (0 branch, 1 junction, 2 interface, 3 end, 4 non-design), and
 /// where a plane section is known its area, the radius of the circle of equal area, the second moments, the torsion
 /// constant and the normal (zeros elsewhere). mm.
@@ -19,8 +24,7 @@ pub fn vtp(skeleton: &Skeleton, out: &mut impl Write) -> io::Result<()> {
         Section::Plane { area, normal, moments, torsion, .. } => Some((area, normal, moments, torsion)),
         _ => None,
     };
-    type Plane = (f64, glam::DVec3, [f64; 2], f64);
-    let columns: [(&str, fn(Plane) -> f64); 5] = [
+    let columns: [(&str, Value); 5] = [
         ("area_mm2", |s| s.0),
         ("radius_mm", |s| (s.0 / std::f64::consts::PI).sqrt()),
         ("I1_mm4", |s| s.2[0]),

@@ -1,7 +1,7 @@
 //! From the Reeb graph to a graph of branches: level loops become points, bumps go, chains become one branch.
 
-use super::piece::Piece;
 use super::reeb::ReebGraph;
+use crate::piece::Piece;
 use glam::DVec3;
 use topipe_mesh::VertexId;
 

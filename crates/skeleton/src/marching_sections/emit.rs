@@ -3,12 +3,12 @@
 use super::axis::{Axis, OWN, resample};
 use super::branches::{Branch, BranchGraph, NodeKind};
 use super::junction::Ray;
-use super::piece::Piece;
 use super::section::{Cutter, Loop};
 use super::{junction, mean};
 use crate::Parameters;
 use crate::inside::Inside;
 use crate::interface::Sets;
+use crate::piece::Piece;
 use crate::skeleton::{PointKind, Section, Skeleton};
 use crate::torsion_constant;
 use glam::DVec3;

@@ -1,7 +1,7 @@
 //! Geodesic distance on a triangle mesh by one front (Kimmel and Sethian 1998, with the exact update from two known
 //! distances in the plane of the triangle instead of a planar wave).
 
-use super::piece::Piece;
+use crate::piece::Piece;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use topipe_mesh::VertexId;

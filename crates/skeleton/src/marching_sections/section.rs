@@ -1,6 +1,6 @@
 //! Plane sections of a closed mesh: the loops, their area, centroid and second moments (Green's theorem).
 
-use super::piece::Piece;
+use crate::piece::Piece;
 use glam::{DVec2, DVec3};
 use topipe_mesh::{HalfEdgeId, VertexId};
 

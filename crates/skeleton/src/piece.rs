@@ -6,21 +6,21 @@ use topipe_mesh::{Connectivity, HalfEdgeId, TriangleMesh, VertexId};
 
 /// A closed, connected surface: the faces of a design set, then one fan of triangles per interface.
 #[derive(Debug, Clone)]
-pub(super) struct Piece {
-    pub(super) mesh: TriangleMesh,
-    pub(super) connectivity: Connectivity,
+pub(crate) struct Piece {
+    pub(crate) mesh: TriangleMesh,
+    pub(crate) connectivity: Connectivity,
     /// How many faces are of the part; those after them close interfaces.
-    pub(super) own_faces: usize,
+    pub(crate) own_faces: usize,
     /// The interface and the tip of its fan.
-    pub(super) tips: Vec<(usize, VertexId)>,
+    pub(crate) tips: Vec<(usize, VertexId)>,
     /// The vertices of the interfaces, all of them.
-    pub(super) rims: Vec<VertexId>,
+    pub(crate) rims: Vec<VertexId>,
     /// The longest edge at each vertex: a plane further away can not cut one of its edges.
-    pub(super) longest_edge: Vec<f64>,
+    pub(crate) longest_edge: Vec<f64>,
 }
 
 impl Piece {
-    pub(super) fn cut(
+    pub(crate) fn cut(
         mesh: &TriangleMesh,
         connectivity: &Connectivity,
         sets: &Sets,
