@@ -144,14 +144,61 @@ pub fn open(file: &[u8]) -> Result<(Header, &[u8]), DecodeError> {
 const LONGEST_HEADER: usize = 60 + LONGEST_KIND;
 /// What is read at a time: it stays in the second-level cache between reading and hashing.
 const BLOCK: usize = 256 * 1024;
-/// From this size on one file is hashed by all threads, which needs larger blocks.
-const LARGE: u64 = 64 << 20;
-const LARGE_BLOCK: usize = 16 << 20;
+/// From this size on all threads hash one file.
+const LARGE: u64 = 4 << 20;
 
 /// Reads a file, checks header and payload against each other, and returns the header. Unlike [`open`] it never holds
 /// the whole file.
-pub fn verify(mut file: impl std::io::Read, length: u64) -> std::io::Result<Result<Header, DecodeError>> {
-    let mut block = vec![0; if length < LARGE { BLOCK } else { LARGE_BLOCK }];
+pub fn verify(file: &std::fs::File) -> std::io::Result<Result<Header, DecodeError>> {
+    let length = file.metadata()?.len();
+    if cfg!(unix) && length >= LARGE { verify_large(file, length) } else { verify_stream(file) }
+}
+
+/// Hashes the payload in pieces, each read by the thread that hashes it: blake3 is a tree over pieces of 2^n bytes, so
+/// they can be joined afterwards.
+fn verify_large(file: &std::fs::File, length: u64) -> std::io::Result<Result<Header, DecodeError>> {
+    use blake3::hazmat::{ChainingValue, HasherExt, Mode, left_subtree_len, merge_subtrees_non_root};
+    fn subtree(file: &std::fs::File, start: u64, from: u64, length: u64) -> std::io::Result<ChainingValue> {
+        if length > BLOCK as u64 {
+            let left = left_subtree_len(length);
+            let (left, right) = rayon::join(
+                || subtree(file, start, from, left),
+                || subtree(file, start, from + left, length - left),
+            );
+            return Ok(merge_subtrees_non_root(&left?, &right?, Mode::Hash));
+        }
+        thread_local! {
+            static PIECE: std::cell::RefCell<Vec<u8>> = const { std::cell::RefCell::new(Vec::new()) };
+        }
+        PIECE.with_borrow_mut(|piece| {
+            piece.resize(length as usize, 0);
+            crate::cache::read_at(file, piece, start + from)?;
+            Ok(blake3::Hasher::new().set_input_offset(from).update(piece).finalize_non_root())
+        })
+    }
+    let mut front = [0; LONGEST_HEADER];
+    crate::cache::read_at(file, &mut front, 0)?;
+    let (header, start) = match split(&front) {
+        Ok((header, rest)) => (header, (front.len() - rest.len()) as u64),
+        Err(error) => return Ok(Err(error)),
+    };
+    let found = length - start;
+    if found != header.payload_bytes {
+        return Ok(Err(DecodeError::Length { expected: header.payload_bytes, found }));
+    }
+    let left = left_subtree_len(found);
+    let (one, two) =
+        rayon::join(|| subtree(file, start, 0, left), || subtree(file, start, left, found - left));
+    let root = blake3::hazmat::merge_subtrees_root(&one?, &two?, Mode::Hash);
+    Ok(if root.as_bytes() == header.payload_hash.as_bytes() {
+        Ok(header)
+    } else {
+        Err(DecodeError::PayloadHash)
+    })
+}
+
+fn verify_stream(mut file: impl std::io::Read) -> std::io::Result<Result<Header, DecodeError>> {
+    let mut block = vec![0; BLOCK];
     let mut filled = fill(&mut file, &mut block)?;
     let (header, start) = match split(&block[..filled.min(LONGEST_HEADER)]) {
         // The rest of the first bytes belongs to the payload.
@@ -163,11 +210,7 @@ pub fn verify(mut file: impl std::io::Read, length: u64) -> std::io::Result<Resu
     loop {
         let bytes = &block[from..filled];
         found += bytes.len() as u64;
-        if length < LARGE {
-            hasher.update(bytes)
-        } else {
-            hasher.update_rayon(bytes)
-        };
+        hasher.update(bytes);
         if filled < block.len() {
             break;
         }
@@ -343,10 +386,15 @@ mod tests {
     fn a_file_verifies_piece_by_piece_as_it_does_whole() {
         let check = |bytes: &[u8]| {
             let whole = open(bytes).map(|(header, _)| header);
-            assert_eq!(verify(bytes, bytes.len() as u64).unwrap(), whole);
+            assert_eq!(verify_stream(bytes).unwrap(), whole);
+            if bytes.len() > BLOCK {
+                let mut file = tempfile::tempfile().unwrap();
+                std::io::Write::write_all(&mut file, bytes).unwrap();
+                assert_eq!(verify_large(&file, bytes.len() as u64).unwrap(), whole);
+            }
             whole.is_ok()
         };
-        for length in [0, 1, BLOCK - 70, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK] {
+        for length in [0, 1, BLOCK - 70, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK, 5_000_000] {
             let mut file = frame(&vec![7; length], "sample", 1);
             assert!(check(&file));
             *file.last_mut().unwrap() ^= 1;

@@ -27,6 +27,7 @@ pub use lock::{KeyLock, LockError};
 pub use remote::{Remote, SharedFolder};
 pub use runs::KeptRun;
 pub(crate) use seal::{seal, unseal};
+pub(crate) use segment::read_at;
 pub use store::{Cache, CacheError, Damage, KeyRecord, StoredArtifact, Usage};
 pub use temporary::write_atomically;
 pub(crate) use temporary::{Durability, Temporary, sweep};

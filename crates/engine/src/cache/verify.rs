@@ -52,8 +52,7 @@ fn verify_artifact(path: &Path) -> Result<bool, String> {
         Err(error) => return Err(error.to_string()),
     };
     let hash = hash_of_path(path).ok_or("its name is not a hash")?;
-    let length = file.metadata().map_err(|error| error.to_string())?.len();
-    let header = codec::verify(file, length).map_err(|error| error.to_string())?;
+    let header = codec::verify(&file).map_err(|error| error.to_string())?;
     let header = header.map_err(|error| error.to_string())?;
     if header.identity() == hash { Ok(true) } else { Err("it is another artifact than its name says".into()) }
 }
