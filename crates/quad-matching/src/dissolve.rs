@@ -115,3 +115,85 @@ fn drop_quads(layout: &mut QuadLayout, gone: &[bool]) {
         *quad = number.get(*quad as usize).copied().unwrap_or(QuadLayout::NO_QUAD);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{MacroEdge, verify};
+    use topipe_mesh::{DVec3, Part, Region, RegionShape, TriangleMesh, VertexId};
+
+    /// The sides of a cube, counter-clockwise from outside: bottom, top, front, right, back, left.
+    const SIDES: [[u32; 4]; 6] =
+        [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+
+    /// A cube with one quad a side; faces 2 k and 2 k + 1 belong to side k.
+    fn cube(regions: &[(usize, u32)]) -> QuadLayout {
+        let corner = |v: u32| {
+            let high = |bit: bool| f64::from(u8::from(bit));
+            [high(v % 4 == 1 || v % 4 == 2), high(v % 4 >= 2), high(v >= 4)]
+        };
+        let triangles = SIDES.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let mut part = Part::new(TriangleMesh::from_arrays((0..8).map(corner).collect(), triangles));
+        let count = regions.iter().map(|&(_, region)| region + 1).max().unwrap_or(0);
+        let shape = RegionShape::Plane { point: DVec3::ZERO, normal: DVec3::Z };
+        part.regions = (0..count).map(|_| Region { shape, area: 0.0, residual: 0.0 }).collect();
+        for &(face, region) in regions {
+            part.region_of_face[face] = RegionId(region);
+        }
+        let mut edges: Vec<MacroEdge> = Vec::new();
+        let quads = SIDES.map(|corners| {
+            [0, 1, 2, 3].map(|k: usize| {
+                let (a, b) = (corners[k], corners[(k + 1) % 4]);
+                let ends = [a.min(b), a.max(b)];
+                let edge = edges.iter().position(|edge| edge.ends == ends).unwrap_or_else(|| {
+                    edges.push(MacroEdge { ends, path: ends.map(VertexId).to_vec(), feature: None });
+                    edges.len() - 1
+                });
+                Side { edge: edge as u32, reversed: a > b }
+            })
+        });
+        QuadLayout {
+            part,
+            vertices: (0..8).map(VertexId).collect(),
+            edges,
+            quads: quads.to_vec(),
+            quad_of_face: (0..12).map(|face| face / 2).collect(),
+            region_faces: Vec::new(),
+            tiles: 0,
+            macro_triangles: 0,
+        }
+    }
+
+    #[test]
+    fn quads_of_a_region_become_one_face() {
+        // The top and the front are one region: their common edge goes.
+        let mut layout = cube(&[(2, 0), (3, 0), (4, 0), (5, 0)]);
+        assert_eq!(verify(&layout), Vec::<String>::new());
+        assert_eq!(dissolve(&mut layout), Dissolved { faces: 1, free: 0 });
+        assert_eq!(verify(&layout), Vec::<String>::new());
+        assert_eq!((layout.quads.len(), layout.edges.len(), layout.vertices.len()), (4, 11, 8));
+        let loops = &layout.region_faces[0].loops;
+        assert_eq!(loops.iter().map(Vec::len).collect::<Vec<_>>(), [6]);
+        // Again there is nothing left to do.
+        assert_eq!(dissolve(&mut layout), Dissolved { faces: 0, free: 0 });
+    }
+
+    #[test]
+    fn a_ring_of_quads_has_two_borders() {
+        let around: Vec<(usize, u32)> = (4..12).map(|face| (face, 0)).collect();
+        let mut layout = cube(&around);
+        assert_eq!(dissolve(&mut layout), Dissolved { faces: 1, free: 0 });
+        assert_eq!(verify(&layout), Vec::<String>::new());
+        assert_eq!((layout.quads.len(), layout.edges.len()), (2, 8));
+        assert_eq!(layout.region_faces[0].loops.iter().map(Vec::len).collect::<Vec<_>>(), [4, 4]);
+    }
+
+    #[test]
+    fn a_region_that_ends_inside_a_quad_stays() {
+        let mut layout = cube(&[(2, 0), (3, 0), (4, 1), (6, 1)]);
+        assert_eq!(dissolve(&mut layout), Dissolved { faces: 1, free: 1 });
+        assert_eq!(layout.region_faces.iter().map(|face| face.region).collect::<Vec<_>>(), [RegionId(0)]);
+        assert_eq!(layout.quads.len(), 5);
+        assert_eq!(verify(&layout), Vec::<String>::new());
+    }
+}
