@@ -40,8 +40,13 @@ pictures: all
         target/release/topipe -q render surface --pipeline pipelines/$case.toml \
             -o pipelines/pictures/$case.png --size 720x540 || exit 1; \
     done
-    target/release/topipe -q render frame --pipeline pipelines/cantilever.toml \
-        -o pipelines/pictures/cantilever-skeleton.png --size 720x540
+    for case in cantilever cantilever-four y-form monster-lite space-frame; do \
+        over=$([ $case = space-frame ] && echo mesh || echo smooth); \
+        target/release/topipe -q render frame --pipeline pipelines/$case.toml --over $over \
+            -o pipelines/pictures/$case-skeleton.png --size 720x540 || exit 1; \
+        target/release/topipe -q render beams --pipeline pipelines/$case.toml --over $over \
+            -o pipelines/pictures/$case-beams.png --size 720x540 || exit 1; \
+    done
 
 # Open all nine STEP files in OpenCASCADE and gmsh, at four mesh sizes. Needs the packages of tests/clients.
 clients python="target/clients/bin/python": all
