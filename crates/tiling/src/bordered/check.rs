@@ -116,6 +116,15 @@ pub(crate) fn outline(
     Ok(Outline { border, corners })
 }
 
+/// The square of the length of a border over the area it bounds: 16 for a square, 25 for four squares in a row, 33 for
+/// six. In a map to the disk what is far from the middle shrinks by the exponential of that.
+pub(crate) fn slenderness(surface: &Surface, faces: &[FaceId], border: &[HalfEdgeId]) -> f64 {
+    let mesh = &surface.refiner.part().mesh;
+    let length: f64 = border.iter().map(|&h| surface.length(h)).sum();
+    let area: f64 = faces.iter().map(|&f| mesh.area_vector(f).length() / 2.0).sum();
+    length * length / area
+}
+
 /// The largest angle between a face's normal and the mean normal of a tile, radians, and the face; all but a stray
 /// share of the area lies within it.
 pub(crate) fn normal_cone(surface: &Surface, faces: &[FaceId]) -> (f64, FaceId) {

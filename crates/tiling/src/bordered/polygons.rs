@@ -5,7 +5,7 @@
 //! is no segment, where three borders meet then. It is the line that is equally far from both parts of the border.
 
 use super::Construction;
-use super::check::{Outline, Stamps, normal_cone, outline};
+use super::check::{Outline, Stamps, normal_cone, outline, slenderness};
 use crate::TilingError;
 use std::collections::BTreeMap;
 use topipe_mesh::FaceId;
@@ -20,12 +20,20 @@ const MIDDLE: f64 = 2.3; // 130 degrees
 const WIDE: f64 = 3.5; // 200 degrees
 /// What each side costs that one part has more than the other.
 const UNEVEN: f64 = 0.15;
+/// Tiles more slender than this (see [`slenderness`]) are cut across.
+const SLENDER: f64 = 48.0;
+/// Unless they cover less than this, in squares of the local size: slivers between regions stay in one piece.
+const LEAST_SLENDER_AREA: f64 = 0.01;
+/// What it costs there that one part has all the border.
+const UNEVEN_LENGTH: f64 = 3.0;
 
 /// A place where a cut may end.
 struct Station {
     /// Index in the border of the half-edge after it.
     at: usize,
     value: f64,
+    /// Length of the border before it, mm.
+    along: f64,
     /// Sides before it, counted from the first corner; halves for middles.
     sides: f64,
 }
@@ -52,7 +60,11 @@ impl Construction<'_> {
                 .map(|&f| mesh.area_vector(f).length() / 2.0 / surface.size[f.index()].powi(2))
                 .sum();
             let bent = area >= LEAST_AREA && normal_cone(surface, faces).0 > limit;
-            if (outline.corners.len() > MOST_SIDES || bent) && self.divide(tile as u32, &outline) {
+            let slender =
+                area >= LEAST_SLENDER_AREA && slenderness(surface, faces, &outline.border) > SLENDER;
+            if (outline.corners.len() > MOST_SIDES || bent || slender)
+                && self.divide(tile as u32, &outline, slender)
+            {
                 divided += 1;
             }
         }
@@ -66,6 +78,8 @@ impl Construction<'_> {
         let surface = &self.surface;
         let border = &outline.border;
         let mut stations = Vec::new();
+        let mut reach = vec![0.0];
+        border.iter().for_each(|&h| reach.push(reach[reach.len() - 1] + surface.length(h)));
         for (i, &start) in outline.corners.iter().enumerate() {
             let mut angle = 0.0;
             let mut h = border[start];
@@ -76,7 +90,12 @@ impl Construction<'_> {
                 }
                 h = surface.refiner.twin(h.prev());
             }
-            stations.push(Station { at: start, value: angle.min(WIDE), sides: i as f64 });
+            stations.push(Station {
+                at: start,
+                value: angle.min(WIDE),
+                along: reach[start],
+                sides: i as f64,
+            });
             let end = outline.corners.get(i + 1).copied().unwrap_or(border.len());
             if end >= start + 2 && !surface.is_barrier(border[start]) {
                 let total: f64 = border[start..end].iter().map(|&h| surface.length(h)).sum();
@@ -89,15 +108,21 @@ impl Construction<'_> {
                         break;
                     }
                 }
-                stations.push(Station { at: middle, value: MIDDLE, sides: i as f64 + 0.5 });
+                stations.push(Station {
+                    at: middle,
+                    value: MIDDLE,
+                    along: reach[middle],
+                    sides: i as f64 + 0.5,
+                });
             }
         }
         stations
     }
 
-    fn divide(&mut self, tile: u32, outline: &Outline) -> bool {
+    fn divide(&mut self, tile: u32, outline: &Outline, slender: bool) -> bool {
         let stations = self.stations(outline);
         let all = outline.corners.len() as f64;
+        let total: f64 = outline.border.iter().map(|&h| self.surface.length(h)).sum();
         let mut best: Option<(f64, usize, usize)> = None;
         for (i, a) in stations.iter().enumerate() {
             for b in &stations[i + 1..] {
@@ -107,7 +132,12 @@ impl Construction<'_> {
                 if one.min(two) < 2.0 {
                     continue;
                 }
-                let value = a.value.min(b.value) - UNEVEN * (one - two).abs();
+                let uneven = if slender {
+                    UNEVEN_LENGTH * (1.0 - 2.0 * (b.along - a.along) / total).abs()
+                } else {
+                    UNEVEN * (one - two).abs()
+                };
+                let value = a.value.min(b.value) - uneven;
                 if best.is_none_or(|(most, ..)| value > most) {
                     best = Some((value, a.at, b.at));
                 }

@@ -5,7 +5,7 @@
 //! gives well-shaped tiles but is not sure to end. Then tiles that still are no disks are cut to pieces, which changes
 //! no other tile but for new corners, so that it ends; see [`super::pieces`].
 
-use super::check::{Fault, Outline, Stamps, normal_cone, outline};
+use super::check::{Fault, Outline, Stamps, normal_cone, outline, slenderness};
 use super::surface::NONE;
 use super::{Construction, Seed};
 use crate::TilingError;
@@ -13,7 +13,10 @@ use std::collections::BTreeSet;
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
 
 /// Rounds in which sites are added.
-const SITE_ROUNDS: usize = 5;
+const SITE_ROUNDS: usize = 8;
+/// Strips more slender than this (see [`slenderness`]) have their segment halved, down to this part of the local size.
+const SLENDER: f64 = 45.0;
+const LEAST_SEGMENT: f64 = 0.2;
 /// Rounds in which tiles of many sides are divided.
 const DIVIDE_ROUNDS: usize = 6;
 /// How often segments are halved and everything is begun again.
@@ -71,6 +74,14 @@ impl Construction<'_> {
         let (angle, face) = normal_cone(surface, faces);
         if angle > self.parameters.normal_cone.to_radians() {
             return Some(Remedy::Site(far(face)));
+        }
+        // A strip along a segment much longer than it is deep.
+        if slenderness(surface, faces, &border) > SLENDER {
+            let perimeter: f64 = border.iter().map(|&h| surface.length(h)).sum();
+            let longest = self.longest_segment(faces).map_or(0.0, |(length, _)| length);
+            if longest > 0.3 * perimeter && longest > LEAST_SEGMENT * surface.size[faces[0].index()] {
+                return Some(Remedy::Halve);
+            }
         }
         None
     }
@@ -209,8 +220,8 @@ impl Construction<'_> {
         None
     }
 
-    /// Halves the longest segment along some faces; false if there is none.
-    fn halve_segment_of(&mut self, faces: &[FaceId]) -> bool {
+    /// The longest segment along some faces, and its length.
+    fn longest_segment(&self, faces: &[FaceId]) -> Option<(f64, usize)> {
         let surface = &self.surface;
         let mut beside: Vec<usize> = faces
             .iter()
@@ -230,7 +241,12 @@ impl Construction<'_> {
                 longest = Some((length, i));
             }
         }
-        let Some((_, segment)) = longest else { return false };
+        longest
+    }
+
+    /// Halves the longest segment along some faces; false if there is none.
+    fn halve_segment_of(&mut self, faces: &[FaceId]) -> bool {
+        let Some((_, segment)) = self.longest_segment(faces) else { return false };
         match self.segments[segment].halve(&mut self.surface) {
             Some(second) => {
                 self.segments.push(second);
