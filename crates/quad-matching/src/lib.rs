@@ -6,6 +6,9 @@
 //! matching. By default only good pairs are made and everything is refined once; the source's perfect matching into
 //! macro-quads is [`Pairing::Perfect`].
 //!
+//! [`Pairing::Midpoint`] makes quads of the tiles themselves, without a dual: the way for bordered tiles, see
+//! [`topipe_tiling::Method`].
+//!
 //! Guarantees: see [`QuadLayout`], checked independently by [`verify`]. On a closed surface the number of
 //! macro-triangles is even and their dual graph is cubic and bridgeless, so a perfect matching exists (Petersen).
 //! The refinement moves no point of the surface.

@@ -117,13 +117,36 @@ pub(crate) fn relax(
             progress.step(v as u64, incidence.fans.len() as u64, "vertices");
         }
         for fan in fans.iter().filter(|fan| fan.corners.len() > 1) {
-            let plans =
-                if only_bad { &[Plan::Equal, Plan::Sheared, Plan::Length][..] } else { &[Plan::Equal] };
-            changed += plans.iter().any(|&plan| relax_one(regions, v, fan, plan, only_bad, snap)) as usize;
+            changed += try_plans(regions, v, fan, only_bad, snap) as usize;
         }
     }
     Ok(changed)
 }
+
+/// Tries one placement after another until one is better; true if one was.
+fn try_plans(regions: &mut Regions, v: usize, fan: &Fan, only_bad: bool, snap: f64) -> bool {
+    if !only_bad {
+        return relax_one(regions, v, fan, (Plan::Equal, DVec2::ZERO), only_bad, snap);
+    }
+    let before = star_cost(regions, fan);
+    if before <= 0.0 {
+        return false;
+    }
+    let mut attempt = |plan: Plan, goal: DVec2| relax_one(regions, v, fan, (plan, goal), only_bad, snap);
+    if [Plan::Equal, Plan::Sheared, Plan::Length].into_iter().any(|plan| attempt(plan, DVec2::ZERO)) {
+        return true;
+    }
+    // Near the gates it is worth to look around: on a coarse mesh a step aside may meet better faces.
+    before > BAD
+        && fan.closed
+        && (0..6).any(|k| {
+            let goal = 0.35 * DVec2::from_angle(TAU * f64::from(k) / 6.0);
+            attempt(Plan::Equal, goal) || attempt(Plan::Length, goal)
+        })
+}
+
+/// The cost of a star with a corner outside the gates is about this at least.
+const BAD: f64 = 3.0;
 
 /// The path along a side of a region in its direction.
 fn path(regions: &Regions, (r, k): Corner) -> Vec<VertexId> {
@@ -157,7 +180,14 @@ fn star_cost(regions: &Regions, fan: &Fan) -> f64 {
     sum
 }
 
-fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, plan: Plan, only_bad: bool, snap: f64) -> bool {
+fn relax_one(
+    regions: &mut Regions,
+    v: usize,
+    fan: &Fan,
+    (plan, goal): (Plan, DVec2),
+    only_bad: bool,
+    snap: f64,
+) -> bool {
     let members: Vec<usize> = fan.corners.iter().map(|c| c.0).collect();
     if members.iter().collect::<HashSet<_>>().len() != members.len() {
         return false;
@@ -265,7 +295,7 @@ fn relax_one(regions: &mut Regions, v: usize, fan: &Fan, plan: Plan, only_bad: b
     }
     regions.tiled.begin();
     let mut cutter = Cutter::within(id, border.iter().copied(), map, snap);
-    let site = if fan.closed { cutter.center(&mut regions.tiled, &faces, CENTER) } else { vertex };
+    let site = if fan.closed { cutter.center(&mut regions.tiled, &faces, goal, CENTER) } else { vertex };
     let mut paths = Vec::with_capacity(targets.len());
     for &target in &targets {
         match cutter.straight(&mut regions.tiled, site, target) {

@@ -8,6 +8,7 @@
 
 use crate::QuadMatchingError;
 use crate::sides::Tiled;
+use glam::DVec2;
 use std::collections::{BTreeSet, HashMap, HashSet, VecDeque};
 use std::f64::consts::{PI, TAU};
 use topipe_mesh::disk_map::DiskMap;
@@ -71,9 +72,9 @@ pub(crate) fn map(tiled: &Tiled, task: &SpokeTask) -> Option<DiskMap> {
             start += sectors[i];
         }
     }
-    let mut fixed: HashMap<VertexId, glam::DVec2> = HashMap::with_capacity(n);
+    let mut fixed: HashMap<VertexId, DVec2> = HashMap::with_capacity(n);
     for k in 0..n {
-        fixed.insert(task.border[k], glam::DVec2::from_angle(angle[k]));
+        fixed.insert(task.border[k], DVec2::from_angle(angle[k]));
     }
     for (target, path) in &task.targets {
         let Some(path) = path else { continue };
@@ -126,7 +127,7 @@ pub(crate) fn cut(
     let mut cutter = Cutter::new(task, map.unwrap_or(DiskMap { places: HashMap::new() }), snap);
     let site = match task.anchor {
         Some(vertex) => vertex,
-        None => cutter.center(tiled, &task.faces, CENTER),
+        None => cutter.center(tiled, &task.faces, DVec2::ZERO, CENTER),
     };
     for path in task.targets.iter().filter_map(|t| t.1.as_ref()) {
         cutter.block(path);
@@ -220,24 +221,24 @@ impl Cutter {
         robust::orient2d(a, b, c)
     }
 
-    /// The vertex nearest to the centre of the disk, or a new one there when none is within `near` of its radius.
-    pub(crate) fn center(&mut self, tiled: &mut Tiled, faces: &[FaceId], near: f64) -> VertexId {
+    /// The vertex nearest to a place in the disk, or a new one there when none is within `near`.
+    pub(crate) fn center(&mut self, tiled: &mut Tiled, faces: &[FaceId], goal: DVec2, near: f64) -> VertexId {
         let mesh = &tiled.refiner.part().mesh;
         let nearest =
             faces.iter().flat_map(|f| mesh.triangles[f.index()]).filter(|v| !self.border.contains(v)).min_by(
                 |&a, &b| {
-                    let d = |v| self.map.at(v).length_squared();
+                    let d = |v| self.map.at(v).distance_squared(goal);
                     d(a).total_cmp(&d(b)).then(a.cmp(&b))
                 },
             );
         if let Some(vertex) = nearest
-            && self.map.at(vertex).length() < near
+            && self.map.at(vertex).distance(goal) < near
         {
             return vertex;
         }
-        // The face around the centre; the one that contains it best if rounding leaves none.
+        // The face around the place; the one that contains it best if rounding leaves none.
         let score = |f: FaceId| -> (f64, [f64; 3]) {
-            let [a, b, c] = mesh.triangles[f.index()].map(|v| self.map.at(v));
+            let [a, b, c] = mesh.triangles[f.index()].map(|v| self.map.at(v) - goal);
             let area = (b - a).perp_dot(c - a);
             let w = [b.perp_dot(c) / area, c.perp_dot(a) / area, a.perp_dot(b) / area];
             let least = w.into_iter().fold(f64::INFINITY, f64::min);

@@ -8,6 +8,9 @@
 //! the mesh and the parameters alone. Where the mesh is too coarse for its genus or for the size of the tiles it is
 //! refined, which moves no point of the surface.
 //!
+//! [`Method::Bordered`] makes other tiles: regions of known shape are taken out and feature edges are borders of tiles; see
+//! [`Tiling`] for what holds of them.
+//!
 //! Not guaranteed: that tiles are exactly Voronoi. Where four tiles meet at a vertex of the mesh a few faces change
 //! hands; and faces along a feature curve belong to the nearest site on the curve.
 //!
