@@ -47,16 +47,16 @@ impl DiskMap {
                 rows[row].push((b, half / to_b.length()));
             }
         }
-        // Extreme slivers could overflow: bounded weights stay positive, which is all the theorem asks for.
+        // Slivers without area have weights that are zero, infinite or no numbers: bounded weights stay positive, which
+        // is all the theorem asks for.
         for row in &mut rows {
             let largest = row.iter().map(|e| e.1).filter(|w| w.is_finite()).fold(0.0, f64::max);
+            let largest = if largest > 0.0 { largest } else { 1.0 };
             for entry in row.iter_mut() {
-                if entry.1.is_nan() || entry.1 <= 1e-12 * largest {
-                    entry.1 = if entry.1.is_finite() { 1e-12 * largest } else { largest.max(1.0) };
-                }
-                if largest == 0.0 {
-                    entry.1 = 1.0;
-                }
+                entry.1 = match entry.1 {
+                    w if w.is_nan() => largest,
+                    w => w.clamp(1e-12 * largest, 1e6 * largest),
+                };
             }
         }
         let order = cuthill_mckee(&rows, &index);
@@ -77,10 +77,12 @@ impl DiskMap {
         for (row, entries) in rows.iter().enumerate() {
             let i = place[row];
             for &(v, weight) in entries {
-                system.add(i, i, weight);
                 match index.get(&v) {
-                    Some(&column) => system.add(i, place[column], -weight),
-                    None => right[i] += weight * *fixed.get(&v)?,
+                    Some(&column) => system.add(i, place[column], weight),
+                    None => {
+                        system.absorbed[i] += weight;
+                        right[i] += weight * *fixed.get(&v)?;
+                    }
                 }
             }
         }
@@ -163,16 +165,17 @@ fn cuthill_mckee(rows: &[Vec<(VertexId, f64)>], index: &HashMap<VertexId, usize>
     order
 }
 
-/// A banded matrix, factored in place without pivoting: stable here because the matrix is diagonally dominant.
+/// The weights between free vertices as a band matrix, and of each to the fixed ones.
 struct Banded {
     size: usize,
     band: usize,
     values: Vec<f64>,
+    absorbed: Vec<f64>,
 }
 
 impl Banded {
     fn new(size: usize, band: usize) -> Self {
-        Self { size, band, values: vec![0.0; size * (2 * band + 1)] }
+        Self { size, band, values: vec![0.0; size * (2 * band + 1)], absorbed: vec![0.0; size] }
     }
 
     #[inline]
@@ -185,32 +188,38 @@ impl Banded {
         self.values[at] += value;
     }
 
+    /// Solves in place by elimination without a subtraction (Grassmann, Taksar, Heyman 1985): each pivot is the sum of
+    /// what is left of its row. Weights of slivers differ by many orders of magnitude; a difference of them would be
+    /// rounding, and a cluster of vertices that hardly hangs on to the rest would have no place.
     fn solve(&mut self, right: &mut [DVec2]) -> Option<()> {
         let n = self.size;
         for k in 0..n {
-            let pivot = self.values[self.at(k, k)];
+            let last = (k + self.band).min(n - 1);
+            let pivot = self.absorbed[k] + (k + 1..=last).map(|j| self.values[self.at(k, j)]).sum::<f64>();
             if !(pivot > 0.0 && pivot.is_finite()) {
                 return None;
             }
-            let last = (k + self.band).min(n - 1);
+            let diagonal = self.at(k, k);
+            self.values[diagonal] = pivot;
             for i in k + 1..=last {
                 let factor = self.values[self.at(i, k)] / pivot;
                 if factor == 0.0 {
                     continue;
                 }
-                for j in k + 1..=last {
+                for j in (k + 1..=last).filter(|&j| j != i) {
                     let (to, from) = (self.at(i, j), self.at(k, j));
-                    self.values[to] -= factor * self.values[from];
+                    self.values[to] += factor * self.values[from];
                 }
+                self.absorbed[i] += factor * self.absorbed[k];
                 let step = factor * right[k];
-                right[i] -= step;
+                right[i] += step;
             }
         }
         for k in (0..n).rev() {
             let last = (k + self.band).min(n - 1);
             let mut sum = right[k];
             for j in k + 1..=last {
-                sum -= self.values[self.at(k, j)] * right[j];
+                sum += self.values[self.at(k, j)] * right[j];
             }
             right[k] = sum / self.values[self.at(k, k)];
             if !right[k].is_finite() {

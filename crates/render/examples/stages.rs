@@ -58,7 +58,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     lap("tiling");
     let layout = topipe_quad_matching::match_quads(&tiling, &Default::default(), &silent)?;
     lap("quad matching");
-    let surface = topipe_spline_fit::fit(&layout, &Default::default(), &silent)?;
+    let surface =
+        topipe_spline_fit::fit(&layout, &Default::default(), &topipe_progress::Units::none(), &silent)?;
     lap("spline fit");
     let skeleton = topipe_skeleton::skeletonize(&smoothed, &Default::default(), &silent);
     lap("skeleton");

@@ -100,13 +100,23 @@ impl Basis {
 
     /// Values and derivatives at `t`, which is clamped to [0, 1] (algorithm A2.3).
     pub fn evaluate(&self, t: f64) -> Local {
-        let p = self.degree();
+        // Cubics, which are nearly all there is, with loops of known length: a third of the time.
+        match self.degree() {
+            3 => self.evaluate_with::<4>(t),
+            _ => self.evaluate_with::<{ MAX_DEGREE + 1 }>(t),
+        }
+    }
+
+    /// `N` is the degree plus one, or more.
+    #[inline]
+    fn evaluate_with<const N: usize>(&self, t: f64) -> Local {
+        let p = if N == MAX_DEGREE + 1 { self.degree() } else { N - 1 };
         let t = t.clamp(0.0, 1.0);
         let span = self.span(t);
         let knots = &self.knots;
-        let (mut left, mut right) = ([0.0; MAX_DEGREE + 1], [0.0; MAX_DEGREE + 1]);
+        let (mut left, mut right) = ([0.0; N], [0.0; N]);
         // Upper triangle: basis functions of rising degree; lower: knot differences.
-        let mut ndu = [[0.0; MAX_DEGREE + 1]; MAX_DEGREE + 1];
+        let mut ndu = [[0.0; N]; N];
         ndu[0][0] = 1.0;
         for j in 1..=p {
             left[j] = t - knots[span + 1 - j];
@@ -125,7 +135,7 @@ impl Basis {
             derivatives[0][j] = ndu[j][p];
         }
         for r in 0..=p {
-            let mut a = [[0.0; MAX_DEGREE + 1]; 2];
+            let mut a = [[0.0; N]; 2];
             let (mut s1, mut s2) = (0, 1);
             a[0][0] = 1.0;
             for k in 1..=2.min(p) {

@@ -13,7 +13,7 @@
 mod chains;
 pub(crate) mod crossing;
 mod outline;
-mod sharpness;
+pub(crate) mod sharpness;
 mod smoothing_curve;
 
 use crate::{AnalyticFace, EdgeCurve, PatchSide, SplineFitError};
@@ -115,7 +115,7 @@ fn grain(mesh: &TriangleMesh) -> f64 {
 }
 
 /// The regions beside an edge: of the loop that runs along it, and of the loop that runs against it.
-type Beside = [Option<RegionId>; 2];
+pub(crate) type Beside = [Option<RegionId>; 2];
 
 fn sides(layout: &QuadLayout) -> Result<Vec<Beside>, SplineFitError> {
     let mut sides = vec![[None; 2]; layout.edges.len()];

@@ -1,4 +1,4 @@
-//! Dense Cholesky factorization for the small systems of the fit (tens to a few hundred unknowns).
+//! Cholesky factorization for the systems of the fit: dense ones of tens of unknowns, banded ones of thousands.
 
 use topipe_mesh::DVec3;
 
@@ -69,6 +69,87 @@ impl Symmetric {
     }
 }
 
+/// A symmetric band matrix: row by row, the entries from `band` before the diagonal to the diagonal.
+#[derive(Debug, Clone)]
+pub(crate) struct Banded {
+    size: usize,
+    band: usize,
+    values: Vec<f64>,
+}
+
+impl Banded {
+    /// The zero matrix; entries more than `band` off the diagonal are and stay zero.
+    pub(crate) fn zero(size: usize, band: usize) -> Self {
+        let band = band.min(size.saturating_sub(1));
+        Self { size, band, values: vec![0.0; size * (band + 1)] }
+    }
+
+    /// Adds to the entry (i, j) of the lower triangle; entries above the diagonal are ignored, as they are the same.
+    #[inline]
+    pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
+        if j <= i {
+            debug_assert!(i - j <= self.band);
+            self.values[i * (self.band + 1) + self.band + j - i] += value;
+        }
+    }
+
+    /// Calls `f` with the entries of the lower triangle that are not zero.
+    pub(crate) fn for_each(&self, mut f: impl FnMut(usize, usize, f64)) {
+        for (i, row) in self.values.chunks_exact(self.band + 1).enumerate() {
+            for j in i.saturating_sub(self.band)..=i {
+                let value = row[j + self.band - i];
+                if value != 0.0 {
+                    f(i, j, value);
+                }
+            }
+        }
+    }
+
+    /// Solves in place; `None` unless positive definite to rounding.
+    pub(crate) fn solve(mut self, right: &mut [f64]) -> Option<()> {
+        let (n, band) = (self.size, self.band);
+        let width = band + 1;
+        for i in 0..n {
+            let first = i.saturating_sub(band);
+            let scale = self.values[i * width + band];
+            let (done, row) = self.values.split_at_mut(i * width);
+            for j in first..=i {
+                // Columns first..j of the rows i and j.
+                let start = first.max(j.saturating_sub(band));
+                let (a, b) = (start + band - i, start + band - j);
+                let count = j - start;
+                let dot: f64 = if j == i {
+                    row[a..a + count].iter().map(|x| x * x).sum()
+                } else {
+                    let other = &done[j * width + b..j * width + b + count];
+                    row[a..a + count].iter().zip(other).map(|(x, y)| x * y).sum()
+                };
+                let value = row[j + band - i] - dot;
+                row[j + band - i] = if j < i {
+                    value / done[j * width + band]
+                } else if value > 1e-15 * scale && value.is_finite() {
+                    value.sqrt()
+                } else {
+                    return None;
+                };
+            }
+        }
+        for i in 0..n {
+            let first = i.saturating_sub(band);
+            let row = &self.values[i * width..(i + 1) * width];
+            let dot: f64 = (first..i).map(|k| row[k + band - i] * right[k]).sum();
+            right[i] = (right[i] - dot) / row[band];
+        }
+        for i in (0..n).rev() {
+            right[i] /= self.values[i * width + band];
+            for k in i.saturating_sub(band)..i {
+                right[k] -= self.values[i * width + k + band - i] * right[i];
+            }
+        }
+        right.iter().all(|r| r.is_finite()).then_some(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,5 +177,27 @@ mod tests {
         matrix.add(1, 0, 1.0);
         matrix.add(1, 1, 1.0);
         assert!(matrix.solve(&mut [DVec3::X, DVec3::X]).is_none());
+    }
+
+    #[test]
+    fn a_band_matrix_is_solved_as_a_dense_one() {
+        let (n, band) = (30, 4);
+        let entry = |i: usize, j: usize| {
+            if i == j { 9.0 + i as f64 * 0.1 } else { ((i * 7 + j * 7) as f64 * 0.37).sin() }
+        };
+        let mut matrix = Banded::zero(n, band);
+        let mut dense = Symmetric::zero(n);
+        for i in 0..n {
+            for j in i.saturating_sub(band)..=i {
+                matrix.add(i, j, entry(i, j));
+                dense.add(i, j, entry(i, j));
+            }
+        }
+        let mut right: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
+        let mut expected: Vec<DVec3> = right.iter().map(|&r| DVec3::splat(r)).collect();
+        matrix.solve(&mut right).unwrap();
+        dense.solve(&mut expected).unwrap();
+        assert!(right.iter().zip(&expected).all(|(a, b)| (a - b.x).abs() < 1e-12));
+        assert!(Banded::zero(3, 1).solve(&mut [1.0; 3]).is_none());
     }
 }

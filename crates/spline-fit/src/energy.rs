@@ -77,8 +77,9 @@ impl Gram {
         self.at(2, i, j)
     }
 
+    /// The integral of the product of the `d`-th derivatives of functions `i` and `j`.
     #[inline]
-    fn at(&self, d: usize, i: usize, j: usize) -> f64 {
+    pub(crate) fn at(&self, d: usize, i: usize, j: usize) -> f64 {
         self.values[d][i * self.size + j]
     }
 }

@@ -4,10 +4,32 @@ use crate::{Basis, SplineFitError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the fit; all are dimensionless.
+/// How patches meet along edges that are not features.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Continuity {
+    /// With a common tangent plane.
+    #[default]
+    Tangent,
+    /// Without gaps only (the source's method).
+    Position,
+}
+
+/// Parameters of the fit; angles are in degrees, all else is dimensionless.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Parameters {
+    /// How patches meet: "tangent" or "position".
+    pub continuity: Continuity,
+    /// Spans along an edge to begin with, a power of two, 1 to 16 (continuity "tangent").
+    pub spans: u32,
+    /// Times the spans may be doubled where the surface is not within `tolerance` and `max_normal_jump`.
+    pub refinements: u32,
+    /// Largest distance of the mesh from the surface that is not refined, over the diagonal of the part.
+    pub tolerance: f64,
+    /// Largest angle between the normals of two patches along an edge that is no feature, degrees; knots are inserted
+    /// where it is exceeded.
+    pub max_normal_jump: f64,
     /// Polynomial degree in both directions, 2 to 7.
     pub degree: u32,
     /// Interior knots in both directions, each in (0, 1), in order (source, section 3: 1/3, 2/3).
@@ -31,6 +53,11 @@ const DEFAULT_LAMBDA: f64 = 1.0 - 1e-5;
 impl Default for Parameters {
     fn default() -> Self {
         Self {
+            continuity: Continuity::Tangent,
+            spans: 2,
+            refinements: 3,
+            tolerance: 1e-3,
+            max_normal_jump: 0.1,
             degree: 3,
             interior_knots: vec![1.0 / 3.0, 2.0 / 3.0],
             lambda: DEFAULT_LAMBDA,

@@ -7,7 +7,7 @@
 use glam::DVec2;
 use std::collections::HashMap;
 use topipe_mesh::disk_map::DiskMap;
-use topipe_mesh::{DVec3, FaceId, VertexId};
+use topipe_mesh::{DVec3, FaceId, TriangleMesh, VertexId};
 use topipe_quad_matching::QuadLayout;
 
 /// A point to be approximated.
@@ -20,10 +20,24 @@ pub(crate) struct Sample {
     pub(crate) weight: f64,
 }
 
+/// A point of the mesh with its normal, for local fits: three a face.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SurfaceSample {
+    pub(crate) point: DVec3,
+    /// Unit normal of its face; zero where the face has none.
+    pub(crate) normal: DVec3,
+    /// Area it stands for, mm^2.
+    pub(crate) area: f64,
+}
+
 /// The samples of one quad.
 #[derive(Debug, Clone)]
 pub(crate) struct PatchSamples {
     pub(crate) samples: Vec<Sample>,
+    /// Points of the faces as they are, undivided.
+    pub(crate) surface: Vec<SurfaceSample>,
+    /// A ball around them: centre and radius.
+    pub(crate) ball: (DVec3, f64),
     /// Area of the quad's faces, mm^2.
     pub(crate) area: f64,
 }
@@ -46,25 +60,105 @@ pub(crate) fn arc_length(points: &[DVec3]) -> Vec<f64> {
 const RULE: [[f64; 3]; 3] =
     [[2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0]];
 
+/// A quad with fewer faces than this is divided, each face into four, before it is mapped: the map of a few faces
+/// with all their corners on the sides is as coarse as they are.
+const FACES: usize = 64;
+
+/// A quad's faces as a mesh of their own, with the places of the vertices on its sides.
+struct Piece {
+    mesh: TriangleMesh,
+    fixed: HashMap<VertexId, DVec2>,
+}
+
+impl Piece {
+    fn new(layout: &QuadLayout, quad: usize, faces: &[FaceId]) -> Self {
+        let mesh = &layout.part.mesh;
+        let mut number: HashMap<VertexId, VertexId> = HashMap::with_capacity(faces.len());
+        let mut piece = TriangleMesh::default();
+        for &f in faces {
+            piece.triangles.push(mesh.triangles[f.index()].map(|v| {
+                *number.entry(v).or_insert_with(|| {
+                    piece.positions.push(mesh.position(v));
+                    VertexId::new(piece.positions.len() - 1)
+                })
+            }));
+        }
+        let corner = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
+        let mut fixed: HashMap<VertexId, DVec2> = HashMap::new();
+        for (k, side) in layout.quads[quad].iter().enumerate() {
+            // Along the edge in its own direction, so that both patches get the same parameters bit for bit.
+            let path = &layout.edges[side.edge as usize].path;
+            let points: Vec<DVec3> = path.iter().map(|&v| mesh.position(v)).collect();
+            let (from, to) = (corner[k], corner[(k + 1) % 4]);
+            for (&v, t) in path.iter().zip(arc_length(&points)) {
+                let t = if side.reversed { 1.0 - t } else { t };
+                if let Some(&v) = number.get(&v) {
+                    fixed.insert(v, from.lerp(to, t));
+                }
+            }
+        }
+        Self { mesh: piece, fixed }
+    }
+
+    /// Divides each face into four. Vertices between two of a side that a face joins lie on the side.
+    fn divide(&mut self) {
+        let mut uses: HashMap<[VertexId; 2], u32> = HashMap::new();
+        let key = |a: VertexId, b: VertexId| if a < b { [a, b] } else { [b, a] };
+        for &[a, b, c] in &self.mesh.triangles {
+            [key(a, b), key(b, c), key(c, a)].into_iter().for_each(|e| *uses.entry(e).or_default() += 1);
+        }
+        let mut middles: HashMap<[VertexId; 2], VertexId> = HashMap::new();
+        let mut finer = Vec::with_capacity(4 * self.mesh.triangles.len());
+        for [a, b, c] in std::mem::take(&mut self.mesh.triangles) {
+            let [d, e, f] = [key(a, b), key(b, c), key(c, a)].map(|edge| {
+                *middles.entry(edge).or_insert_with(|| {
+                    let [p, q] = edge.map(|v| self.mesh.positions[v.index()]);
+                    self.mesh.positions.push((p + q) / 2.0);
+                    let middle = VertexId::new(self.mesh.positions.len() - 1);
+                    if let (1, Some(p), Some(q)) =
+                        (uses[&edge], self.fixed.get(&edge[0]), self.fixed.get(&edge[1]))
+                    {
+                        let place = (*p + *q) / 2.0;
+                        self.fixed.insert(middle, place);
+                    }
+                    middle
+                })
+            });
+            finer.extend([[a, d, f], [d, b, e], [f, e, c], [d, e, f]]);
+        }
+        self.mesh.triangles = finer;
+    }
+}
+
 /// Parameterizes quad `quad` and samples its faces. `None` when its faces are not a disk.
 pub(crate) fn sample(layout: &QuadLayout, quad: usize, faces: &[FaceId]) -> Option<PatchSamples> {
-    let mesh = &layout.part.mesh;
-    let corner = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
-    let mut fixed: HashMap<VertexId, DVec2> = HashMap::new();
-    for (k, side) in layout.quads[quad].iter().enumerate() {
-        // Along the edge in its own direction, so that both patches get the same parameters bit for bit.
-        let path = &layout.edges[side.edge as usize].path;
-        let points: Vec<DVec3> = path.iter().map(|&v| mesh.position(v)).collect();
-        let (from, to) = (corner[k], corner[(k + 1) % 4]);
-        for (&v, t) in path.iter().zip(arc_length(&points)) {
-            let t = if side.reversed { 1.0 - t } else { t };
-            fixed.insert(v, from.lerp(to, t));
-        }
+    let mut piece = Piece::new(layout, quad, faces);
+    let surface: Vec<SurfaceSample> = piece
+        .mesh
+        .faces()
+        .flat_map(|f| {
+            let points = piece.mesh.corners(f);
+            let (normal, area) = (piece.mesh.normal(f), piece.mesh.area_vector(f).length() / 6.0);
+            RULE.map(|shares| SurfaceSample {
+                point: (0..3).map(|k| shares[k] * points[k]).sum(),
+                normal,
+                area,
+            })
+        })
+        .filter(|s| s.area > 0.0)
+        .collect();
+    let center = surface.iter().map(|s| s.point).sum::<DVec3>() / surface.len().max(1) as f64;
+    let radius = surface.iter().map(|s| s.point.distance(center)).fold(0.0, f64::max);
+    let degenerate = piece.mesh.triangles.is_empty();
+    while !degenerate && piece.mesh.triangles.len() < FACES {
+        piece.divide();
     }
-    let map = DiskMap::solve(mesh, faces, &fixed)?;
-    let area: f64 = faces.iter().map(|&f| mesh.area_vector(f).length() / 2.0).sum();
-    let mut samples = Vec::with_capacity(3 * faces.len());
-    for &f in faces {
+    let mesh = &piece.mesh;
+    let all: Vec<FaceId> = mesh.faces().collect();
+    let map = DiskMap::solve(mesh, &all, &piece.fixed)?;
+    let area: f64 = all.iter().map(|&f| mesh.area_vector(f).length() / 2.0).sum();
+    let mut samples = Vec::with_capacity(3 * all.len());
+    for f in all {
         let weight = mesh.area_vector(f).length() / 2.0 / (3.0 * area);
         let points = mesh.corners(f);
         let places = mesh.triangles[f.index()].map(|v| map.at(v));
@@ -76,7 +170,7 @@ pub(crate) fn sample(layout: &QuadLayout, quad: usize, faces: &[FaceId]) -> Opti
             }
         }
     }
-    Some(PatchSamples { samples, area })
+    Some(PatchSamples { samples, surface, ball: (center, radius), area })
 }
 
 /// The faces of each quad, in order.

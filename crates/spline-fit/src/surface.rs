@@ -108,22 +108,7 @@ impl SurfacePoint {
 impl Patch {
     /// Position and first derivatives at `(u, v)`.
     pub fn evaluate(&self, u: f64, v: f64) -> SurfacePoint {
-        let (bu, bv) = (self.basis_u.evaluate(u), self.basis_v.evaluate(v));
-        let width = self.basis_u.len();
-        let (mut position, mut du, mut dv) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
-        for j in 0..bv.count {
-            let row = (bv.first + j) * width + bu.first;
-            let (mut value, mut slope) = (DVec3::ZERO, DVec3::ZERO);
-            for i in 0..bu.count {
-                let c = self.control[row + i];
-                value += bu.derivatives[0][i] * c;
-                slope += bu.derivatives[1][i] * c;
-            }
-            position += bv.derivatives[0][j] * value;
-            du += bv.derivatives[0][j] * slope;
-            dv += bv.derivatives[1][j] * value;
-        }
-        SurfacePoint { position, du, dv }
+        evaluate(&self.basis_u, &self.basis_v, &self.control, u, v)
     }
 
     /// The parameters of the point at fraction `t` of side `side`, in the direction of the patch.
@@ -135,4 +120,24 @@ impl Patch {
             _ => (0.0, 1.0 - t),
         }
     }
+}
+
+/// Position and first derivatives of a tensor-product spline, control points with u fastest.
+pub(crate) fn evaluate(basis_u: &Basis, basis_v: &Basis, control: &[DVec3], u: f64, v: f64) -> SurfacePoint {
+    let (bu, bv) = (basis_u.evaluate(u), basis_v.evaluate(v));
+    let width = basis_u.len();
+    let (mut position, mut du, mut dv) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+    for j in 0..bv.count {
+        let row = (bv.first + j) * width + bu.first;
+        let (mut value, mut slope) = (DVec3::ZERO, DVec3::ZERO);
+        for i in 0..bu.count {
+            let c = control[row + i];
+            value += bu.derivatives[0][i] * c;
+            slope += bu.derivatives[1][i] * c;
+        }
+        position += bv.derivatives[0][j] * value;
+        du += bv.derivatives[0][j] * slope;
+        dv += bv.derivatives[1][j] * value;
+    }
+    SurfacePoint { position, du, dv }
 }

@@ -2,7 +2,7 @@
 
 use topipe_mesh::import::{ImportOptions, read};
 use topipe_mesh::{Connectivity, DVec3, Part, TriangleMesh};
-use topipe_progress::Progress;
+use topipe_progress::{Progress, Units};
 use topipe_quad_matching::{QuadLayout, match_quads};
 use topipe_spline_fit::{Basis, Parameters, Patch, SplineFitError, SplineSurface, fit, shells, step};
 
@@ -13,7 +13,7 @@ fn layout(part: &Part, tile_size: f64) -> QuadLayout {
 }
 
 fn fitted(layout: &QuadLayout) -> SplineSurface {
-    fit(layout, &Parameters::default(), &Progress::silent()).unwrap()
+    fit(layout, &Parameters::default(), &Units::none(), &Progress::silent()).unwrap()
 }
 
 fn fixture(name: &str) -> Part {
@@ -228,8 +228,9 @@ fn a_cavity_becomes_a_void() {
 #[test]
 fn bad_parameters_are_refused_with_the_range() {
     let layout = layout(&sphere(3), 1.5);
-    let message =
-        |parameters: Parameters| fit(&layout, &parameters, &Progress::silent()).unwrap_err().to_string();
+    let message = |parameters: Parameters| {
+        fit(&layout, &parameters, &Units::none(), &Progress::silent()).unwrap_err().to_string()
+    };
     assert_eq!(
         message(Parameters { degree: 9, ..Default::default() }),
         "degree = 9 is out of range: it must be 2 to 7"
@@ -245,7 +246,7 @@ fn bad_parameters_are_refused_with_the_range() {
     let mut broken = layout.clone();
     broken.quad_of_face.pop();
     assert!(matches!(
-        fit(&broken, &Parameters::default(), &Progress::silent()),
+        fit(&broken, &Parameters::default(), &Units::none(), &Progress::silent()),
         Err(SplineFitError::Layout(_))
     ));
 }

@@ -11,7 +11,7 @@ pub(crate) const FEATURE_ANGLE: f64 = 20.0;
 const SHARE: f64 = 0.5;
 
 /// Why the edge is a feature, if it is one. Elsewhere the free surface meets the shape smoothly.
-pub(super) fn feature(
+pub(crate) fn feature(
     layout: &QuadLayout,
     connectivity: &Connectivity,
     edge: usize,

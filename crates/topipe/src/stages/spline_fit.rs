@@ -35,7 +35,7 @@ impl Stage for SplineFit {
         parameters: &Parameters,
     ) -> Result<topipe_spline_fit::SplineSurface, StageError> {
         let layout = context.input::<artifacts::QuadLayout>("input")?;
-        fit(&layout, parameters, context.progress()).map_err(|error| match error {
+        fit(&layout, parameters, context.units(), context.progress()).map_err(|error| match error {
             SplineFitError::Interrupted(_) => StageError::Interrupted,
             SplineFitError::Parameter { .. } => StageError::BadParameter(error.to_string()),
             error => StageError::Failed(error.to_string()),

@@ -1,0 +1,227 @@
+//! Fits a case of `fixtures/` and prints how patches meet, worst places first.
+//!
+//!     cargo run --release -p topipe-spline-fit --example continuity -- bracket [SPANS] [REFINEMENTS] [BENDING]
+
+use std::error::Error;
+use std::sync::Arc;
+use std::time::Instant;
+use topipe_mesh::import::{ImportOptions, read};
+use topipe_progress::{Listener, Progress, Units};
+use topipe_spline_fit::{Parameters, Patch, fit};
+
+struct Print;
+
+impl Listener for Print {
+    fn step(&self, _: u64, _: u64, _: &str) {}
+    fn remark(&self, text: &str) {
+        println!("  {text}");
+    }
+    fn interrupted(&self) -> bool {
+        false
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let name = arguments.next().unwrap_or("bracket".into());
+    let number = |text: Option<String>, default: u32| text.map_or(Ok(default), |t| t.parse());
+    let parameters = Parameters {
+        spans: number(arguments.next(), Parameters::default().spans)?,
+        refinements: number(arguments.next(), 0)?,
+        lambda: 1.0
+            - arguments.next().map_or(Ok(1.0 - Parameters::default().lambda), |t| t.parse::<f64>())?,
+        ..Default::default()
+    };
+    let silent = Progress::silent();
+    let path = format!("fixtures/{name}/{name}.stl");
+    let part = read(&path, &std::fs::read(&path)?, &ImportOptions::default())?;
+    let part = topipe_smoothing::smooth(&part, &Default::default(), &silent)?;
+    let tiling = topipe_tiling::tile(
+        &part,
+        &topipe_tiling::Parameters {
+            method: topipe_tiling::Method::Bordered,
+            tile_size: std::env::var("SIZE")
+                .map_or(topipe_tiling::Parameters::default().tile_size, |t| t.parse().unwrap()),
+            normal_cone: std::env::var("CONE")
+                .map_or(topipe_tiling::Parameters::default().normal_cone, |t| t.parse().unwrap()),
+            ..Default::default()
+        },
+        &silent,
+    )?;
+    let layout = topipe_quad_matching::match_quads(
+        &tiling,
+        &topipe_quad_matching::Parameters {
+            pairing: topipe_quad_matching::Pairing::Midpoint,
+            ..Default::default()
+        },
+        &silent,
+    )?;
+    let start = Instant::now();
+    let surface = fit(&layout, &parameters, &Units::none(), &Progress::new(Arc::new(Print)))?;
+    println!(
+        "{name}: {} patches, {} faces, fit {:.2} s",
+        surface.patches.len(),
+        surface.faces.len(),
+        start.elapsed().as_secs_f64()
+    );
+    let mut uses = vec![Vec::new(); surface.edges.len()];
+    for (p, patch) in surface.patches.iter().enumerate() {
+        patch.sides.iter().enumerate().for_each(|(k, s)| uses[s.edge as usize].push((p, k, s.reversed)));
+    }
+    let angles = layout.corner_angles();
+    let mut jumps = Vec::new();
+    for (e, uses) in uses.iter().enumerate() {
+        let (None, [a, b]) = (surface.edges[e].feature, &uses[..]) else { continue };
+        let mut worst = (0.0f64, 0.0);
+        for k in 0..=64 {
+            let t = f64::from(k) / 64.0;
+            let normal = |&(p, side, reversed): &(usize, usize, bool)| {
+                let (u, v) = Patch::side_parameters(side, if reversed { 1.0 - t } else { t });
+                surface.patches[p].evaluate(u, v).normal()
+            };
+            let (n, m) = (normal(a), normal(b));
+            let angle = n.cross(m).length().atan2(n.dot(m)).to_degrees();
+            if angle > worst.0 {
+                worst = (angle, t);
+            }
+        }
+        jumps.push((worst.0, worst.1, e, *a, *b));
+    }
+    jumps.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let above = |limit: f64| jumps.iter().filter(|j| j.0 > limit).count();
+    println!(
+        "{} smooth edges; above 0.1 degrees: {}, 1: {}, 10: {}, 90: {}; median {:.4}",
+        jumps.len(),
+        above(0.1),
+        above(1.0),
+        above(10.0),
+        above(90.0),
+        jumps[jumps.len() / 2].0
+    );
+    for &(jump, t, e, a, b) in jumps.iter().filter(|j| j.0 > 1.0).step_by(4).take(24) {
+        let curve = &surface.edges[e];
+        let chord = curve.control[0].distance(curve.control[curve.control.len() - 1]);
+        println!("  {jump:8.3} at {t:.2} of edge {e}, length {chord:.2}, {:?}", curve.position(t));
+        for (p, side, reversed) in [a, b] {
+            let line: Vec<String> = (0..=8)
+                .map(|k| {
+                    let t = f64::from(k) / 8.0;
+                    let (u, v) = Patch::side_parameters(side, if reversed { 1.0 - t } else { t });
+                    let s = surface.patches[p].evaluate(u, v);
+                    let (along, across) = match side {
+                        0 => (s.du, s.dv),
+                        1 => (s.dv, -s.du),
+                        2 => (-s.du, -s.dv),
+                        _ => (-s.dv, s.du),
+                    };
+                    format!("{:.0}", along.angle_between(across).to_degrees())
+                })
+                .collect();
+            println!("      angle between along and across: {}", line.join(" "));
+            let faces = layout.quad_of_face.iter().filter(|&&q| q == p as u32).count();
+            println!(
+                "      patch {p} side {side}: {faces} faces, angles {:?}, patches beside its sides {:?}",
+                angles[p].map(|a| a.to_degrees().round()),
+                surface.patches[p].sides.map(|s| uses[s.edge as usize].len())
+            );
+        }
+    }
+    folded(&layout, &surface);
+    if let Ok(p) = std::env::var("PATCH").unwrap_or_default().parse::<usize>() {
+        let patch = &surface.patches[p];
+        let mesh = &layout.part.mesh;
+        let mut out = String::new();
+        for i in 0..=12 {
+            for j in 0..=12 {
+                let q = patch.evaluate(f64::from(i) / 12.0, f64::from(j) / 12.0).position;
+                out += &format!("s {} {} {}\n", q.x, q.y, q.z);
+            }
+        }
+        for (f, &q) in layout.quad_of_face.iter().enumerate() {
+            if q as usize == p {
+                for c in mesh.corners(topipe_mesh::FaceId::new(f)) {
+                    out += &format!("f {} {} {}\n", c.x, c.y, c.z);
+                }
+            }
+        }
+        for s in layout.quads[p] {
+            for v in &layout.edges[s.edge as usize].path {
+                let c = mesh.position(*v);
+                out += &format!("p {} {} {}\n", c.x, c.y, c.z);
+            }
+            out += "e 0 0 0\n";
+        }
+        std::fs::write("/tmp/patch.txt", out)?;
+    }
+    Ok(())
+}
+
+/// Patches whose normal turns against their mean somewhere, by what is odd about them.
+fn folded(layout: &topipe_quad_matching::QuadLayout, surface: &topipe_spline_fit::SplineSurface) {
+    let mesh = &layout.part.mesh;
+    let mut faces = vec![Vec::new(); layout.quads.len()];
+    for (f, &q) in layout.quad_of_face.iter().enumerate() {
+        if (q as usize) < faces.len() {
+            faces[q as usize].push(topipe_mesh::FaceId::new(f));
+        }
+    }
+    let mut count = 0;
+    let mut tallies = [0; 4];
+    for (p, patch) in surface.patches.iter().enumerate() {
+        let n = 24;
+        let grid = || {
+            (0..=n).flat_map(|i| {
+                (0..=n).map(move |j| (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n)))
+            })
+        };
+        let area: topipe_mesh::DVec3 = faces[p].iter().map(|&f| mesh.area_vector(f)).sum();
+        let mean = area.normalize_or_zero();
+        let bad: Vec<(f64, f64)> =
+            grid().filter(|&(u, v)| patch.evaluate(u, v).normal().dot(mean) < 0.0).collect();
+        let cone = faces[p]
+            .iter()
+            .map(|&f| mesh.normal(f).dot(mean).clamp(-1.0, 1.0).acos().to_degrees())
+            .fold(0.0, f64::max);
+        if bad.len() <= 2 {
+            continue;
+        }
+        count += 1;
+        let at = |u: f64, v: f64| patch.evaluate(u, v);
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(u, v)| {
+            let s = at(u, v);
+            let (a, b) = match (u > 0.5, v > 0.5) {
+                (false, false) => (s.du, s.dv),
+                (true, false) => (s.dv, -s.du),
+                (true, true) => (-s.du, -s.dv),
+                _ => (-s.dv, s.du),
+            };
+            let angle = a.angle_between(b).to_degrees();
+            if a.cross(b).dot(mean) < 0.0 { -angle } else { angle }
+        });
+        let border = bad.iter().filter(|(u, v)| u.min(1.0 - u).min(v.min(1.0 - v)) < 0.05).count();
+        let ragged = corners.iter().any(|a| *a < 5.0);
+        tallies[0] += usize::from(ragged);
+        tallies[1] += usize::from(cone > 80.0);
+        tallies[2] += usize::from(faces[p].len() < 8);
+        tallies[3] += usize::from(border == bad.len());
+        if count % 10 == 1 {
+            let layout_angles = layout.corner_angles()[p].map(|a| a.to_degrees().round());
+            println!(
+                "patch {p}: {} faces, cone {cone:.0}, {} of {} points folded ({border} at the border), corners {:?} (layout {layout_angles:?}), sides {:?}, at {:?}",
+                faces[p].len(),
+                bad.len(),
+                (n + 1) * (n + 1),
+                corners.map(|a| a.round()),
+                [0usize, 1, 2, 3].map(|k| {
+                    let c = &surface.edges[patch.sides[k].edge as usize].control;
+                    (10.0 * c[0].distance(c[c.len() - 1])).round() / 10.0
+                }),
+                at(0.5, 0.5).position.round()
+            );
+        }
+    }
+    println!(
+        "{count} folded patches: {} with a turned corner, {} with a wide cone, {} of few faces, {} along the border only",
+        tallies[0], tallies[1], tallies[2], tallies[3]
+    );
+}

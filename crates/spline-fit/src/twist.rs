@@ -1,0 +1,128 @@
+//! How the normals turn along the edges as they leave a vertex.
+//!
+//! Two things must hold there, or a patch can not meet the normals along both of its sides near its corner. Along a
+//! curve the normal turns as the curve bends: n'.c' = -n.c''. And at a corner the mixed derivative of the patch, asked
+//! for by both sides, must be the same: e_j . n_i' = e_i . n_j' for the legs e_i, e_j. For curves on one smooth surface
+//! both hold by themselves, with n' = -W c' for the shape operator W; curves that interpolate a noisy mesh bend a
+//! little differently. So n' takes its part along each curve from the curve, and its part across (the geodesic
+//! torsion) such that the corners agree: with angle phi between edges i and j,
+//! (torsion_i + torsion_j) sin phi = (curvature_j - curvature_i) cos phi.
+//! Around an odd number of edges that has a solution, around an even number up to one condition (the vertex
+//! enclosure problem, Peters 1991); it is solved by least squares, held weakly to the shape operator.
+
+use crate::cholesky::Banded;
+use crate::local_surface::LocalSurface;
+use topipe_mesh::DVec3;
+
+/// An edge as it leaves the vertex.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Leg {
+    /// First derivative of the curve, out of the vertex.
+    pub(crate) first: DVec3,
+    /// Second derivative.
+    pub(crate) second: DVec3,
+}
+
+/// Weight of the torsions of the shape operator against those that make the corners agree.
+const HOLD: f64 = 1e-4;
+
+/// Derivatives of the normal along each leg. `legs` are in order around the vertex, `None` for creases, where nothing
+/// is asked for; `closed` tells whether the last and the first bound a corner.
+pub(crate) fn turning(surface: &LocalSurface, legs: &[Option<Leg>], closed: bool) -> Vec<Option<DVec3>> {
+    let n = legs.len();
+    let normal = surface.normal;
+    // Unit direction, unit direction across, curvature, torsion of the shape operator.
+    let data: Vec<Option<(DVec3, DVec3, f64, f64, f64)>> = legs
+        .iter()
+        .map(|leg| {
+            let leg = (*leg)?;
+            let length = leg.first.length();
+            let along = (leg.first - leg.first.dot(normal) * normal).try_normalize()?;
+            let across = normal.cross(along);
+            let curvature = leg.second.dot(normal) / (length * length);
+            let torsion = across.dot(surface.form * along);
+            Some((along, across, curvature, torsion, length))
+        })
+        .collect();
+    let corners: Vec<(usize, usize)> = (0..n)
+        .map(|i| (i, (i + 1) % n))
+        .take(if closed && n > 2 { n } else { n.saturating_sub(1) })
+        .collect();
+    let mut matrix = Banded::zero(n, n);
+    let mut right = vec![0.0; n];
+    for (i, datum) in data.iter().enumerate() {
+        matrix.add(i, i, HOLD);
+        if let Some((_, _, _, torsion, _)) = datum {
+            right[i] += HOLD * torsion;
+        }
+    }
+    for (i, j) in corners {
+        let (Some(a), Some(b)) = (data[i], data[j]) else { continue };
+        let (cos, sin) = (a.0.dot(b.0), a.1.dot(b.0));
+        let goal = (b.2 - a.2) * cos;
+        for row in [i, j] {
+            right[row] += sin * goal;
+            for column in [i, j] {
+                matrix.add(row, column, sin * sin);
+            }
+        }
+    }
+    let solved = matrix.solve(&mut right).is_some();
+    data.iter()
+        .enumerate()
+        .map(|(i, datum)| {
+            let (along, across, curvature, torsion, length) = (*datum)?;
+            let torsion = if solved { right[i] } else { torsion };
+            Some(-length * (curvature * along + torsion * across))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+
+    /// Curves on a saddle: the shape operator's own derivatives come out.
+    #[test]
+    fn curves_on_a_smooth_surface_turn_with_its_shape_operator() {
+        let form = DMat3::from_cols(DVec3::new(0.7, 0.2, 0.0), DVec3::new(0.2, -0.4, 0.0), DVec3::ZERO);
+        let surface = LocalSurface { position: DVec3::ZERO, normal: DVec3::Z, form };
+        for n in 3..8 {
+            let legs: Vec<Option<Leg>> = (0..n)
+                .map(|k| {
+                    let angle = k as f64 / n as f64 * std::f64::consts::TAU + 0.1 * (k as f64).sin();
+                    let first = DVec3::new(angle.cos(), angle.sin(), 0.0) * (1.0 + 0.1 * k as f64);
+                    let second = DVec3::new(0.3, 0.1 * k as f64, first.dot(form * first));
+                    Some(Leg { first, second })
+                })
+                .collect();
+            for (leg, turn) in legs.iter().zip(turning(&surface, &legs, true)) {
+                let expected = -(form * leg.unwrap().first);
+                assert!(turn.unwrap().distance(expected) < 1e-9, "{n} legs");
+            }
+        }
+    }
+
+    /// Curves that bend as they like: around an odd number of them the corners agree all the same.
+    #[test]
+    fn corners_agree_around_an_odd_number_of_curves() {
+        let surface = LocalSurface { position: DVec3::ZERO, normal: DVec3::Z, form: DMat3::ZERO };
+        for n in [3, 5, 7] {
+            let legs: Vec<Option<Leg>> = (0..n)
+                .map(|k| {
+                    let angle = k as f64 / n as f64 * std::f64::consts::TAU;
+                    let first = DVec3::new(angle.cos(), angle.sin(), 0.0);
+                    Some(Leg { first, second: DVec3::Z * (k as f64 * 1.7).sin() })
+                })
+                .collect();
+            let turns = turning(&surface, &legs, true);
+            for i in 0..n {
+                let j = (i + 1) % n;
+                let (a, b) = (legs[i].unwrap(), legs[j].unwrap());
+                let difference = b.first.dot(turns[i].unwrap()) - a.first.dot(turns[j].unwrap());
+                assert!(difference.abs() < 1e-2, "{n} legs: {difference}");
+            }
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! Tangent continuity on surfaces that are known.
+
+mod common;
+
+use common::{largest_jump, layout, sphere, torus};
+use topipe_progress::{Progress, Units};
+use topipe_spline_fit::{Parameters, SplineSurface, fit};
+
+fn fitted(part: &topipe_mesh::Part, tile_size: f64, spans: u32) -> SplineSurface {
+    let parameters = Parameters { spans, refinements: 0, ..Default::default() };
+    fit(&layout(part, tile_size), &parameters, &Units::none(), &Progress::silent()).unwrap()
+}
+
+/// The largest distance from a surface, over a grid of each patch.
+fn off(surface: &SplineSurface, distance: impl Fn(topipe_mesh::DVec3) -> f64) -> f64 {
+    let grid = || (0..=10).flat_map(|i| (0..=10).map(move |j| (f64::from(i) / 10.0, f64::from(j) / 10.0)));
+    surface
+        .patches
+        .iter()
+        .flat_map(|patch| grid().map(|(u, v)| distance(patch.evaluate(u, v).position).abs()))
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn patches_on_a_sphere_meet_with_a_common_tangent_plane() {
+    let part = sphere(5);
+    for spans in [2, 4] {
+        let surface = fitted(&part, 1.2, spans);
+        assert!(largest_jump(&surface) < 0.05, "{spans} spans: {} degrees", largest_jump(&surface));
+        assert!(off(&surface, |p| p.length() - 1.0) < 2e-3);
+    }
+}
+
+#[test]
+fn patches_on_a_torus_meet_with_a_common_tangent_plane() {
+    // A mesh with eleven degrees from facet to facet: the normals are those of a smooth surface all the same.
+    let surface = fitted(&torus(3.0, 1.0, 96, 32), 1.5, 2);
+    assert!(largest_jump(&surface) < 0.2, "{} degrees", largest_jump(&surface));
+    let tube = |p: topipe_mesh::DVec3| (p.truncate().length() - 3.0).hypot(p.z) - 1.0;
+    assert!(off(&surface, tube) < 1e-2);
+}
