@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 pub enum Pairing {
     /// Pairs that make good quads are matched, then everything is refined once: a quad gives four quads, a triangle
     /// three. No corner is forced to be reflex, no feature edge is given up.
-    #[default]
     Refined,
     /// Tiles themselves are subdivided from their centres to the middles of their sides. The only way for bordered
     /// tiles.
+    #[default]
     Midpoint,
     /// Every triangle is paired (source, section 2.2): a quarter of the patches, at the price of some bad corners.
     Perfect,

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// The source's tessellation of a closed surface, whose dual is a layout; features run from site to site.
-    #[default]
     AugmentedVoronoi,
     /// Tiles of what is left when regions of known shape are taken out; features run along their borders.
+    #[default]
     Bordered,
 }
 
