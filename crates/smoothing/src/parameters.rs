@@ -111,7 +111,9 @@ pub struct Parameters {
     pub plane_angle: Option<f64>,
     /// Smallest area of a flat face, in squared mean edge lengths (an equilateral triangle has 0.43). Keeps the steps
     /// of a voxel mesh and chance patches of the free surface from being frozen. On nine parts from optimization all
-    /// flat faces of 5 or more were real; 10 leaves room.
+    /// flat faces of 5 or more were real; 10 leaves room. A fifth of it is asked of an exact face that non-design labels
+    /// or other regions around it vouch for, twice as much of an arc of a cylinder, and always 1e-4 of the whole surface,
+    /// so that a fine mesh does not fall into chips.
     pub plane_area: f64,
     /// Largest distance of a vertex from the cylinder of its hole, in mean edge lengths of the hole's wall.
     pub hole_tolerance: f64,

@@ -395,10 +395,10 @@ fn name(shape: Shape) -> &'static str {
 fn describe(shape: &RegionShape) -> String {
     match shape {
         RegionShape::Plane { point, normal } => {
-            format!("a plane with normal ({normal:.3}) at {:.4} mm", normal.dot(*point))
+            format!("a plane with normal {normal:.3} at {:.4} mm", normal.dot(*point))
         }
         RegionShape::Cylinder { point, axis, radius, hole } => format!(
-            "a {} of {:.4} mm about ({axis:.3}) through ({point:.3})",
+            "a {} of {:.4} mm about {axis:.3} through {point:.3}",
             if *hole { "hole" } else { "boss" },
             2.0 * radius
         ),
@@ -427,5 +427,5 @@ fn list(claims: &Claims) -> String {
 
 fn reach(part: &Part) -> String {
     let (low, high) = part.mesh.bounds();
-    format!("from ({low:.3}) to ({high:.3}) mm")
+    format!("from {low:.3} to {high:.3} mm")
 }

@@ -119,10 +119,10 @@ fn describe_regions(part: &Part) -> String {
     for (id, region) in part.regions.iter().enumerate() {
         let shape = match region.shape {
             RegionShape::Plane { point, normal } => {
-                format!("plane, normal ({normal:.4}) at {:.4} mm", normal.dot(point))
+                format!("plane, normal {normal:.4} at {:.4} mm", normal.dot(point))
             }
             RegionShape::Cylinder { point, axis, radius, hole } => format!(
-                "{} of {:.4} mm, axis ({axis:.4}) through ({point:.3})",
+                "{} of {:.4} mm, axis {axis:.4} through {point:.3}",
                 if hole { "hole" } else { "boss" },
                 2.0 * radius
             ),
