@@ -12,12 +12,22 @@ fn fixture(name: &str) -> Part {
     read(&path, &std::fs::read(&path).unwrap(), &ImportOptions::default()).unwrap()
 }
 
+/// The source's tessellation: closed, with a cubic dual.
+fn source() -> topipe_tiling::Parameters {
+    topipe_tiling::Parameters { method: topipe_tiling::Method::AugmentedVoronoi, ..Default::default() }
+}
+
+/// Its layout, good pairs first.
+fn refined() -> Parameters {
+    Parameters { pairing: Pairing::Refined, ..Default::default() }
+}
+
 fn tiling(name: &str) -> Tiling {
-    tile(&fixture(name), &Default::default(), &Progress::silent()).unwrap()
+    tile(&fixture(name), &source(), &Progress::silent()).unwrap()
 }
 
 fn layout(tiling: &Tiling) -> QuadLayout {
-    match_quads(tiling, &Parameters::default(), &Progress::silent()).unwrap()
+    match_quads(tiling, &refined(), &Progress::silent()).unwrap()
 }
 
 #[test]
@@ -56,7 +66,7 @@ fn tiles_of_any_size_give_a_layout() {
     for name in ["y-form", "monster-lite", "cantilever"] {
         let part = fixture(name);
         for tile_size in [2.0, 6.0, 12.0, 40.0] {
-            let parameters = topipe_tiling::Parameters { tile_size, ..Default::default() };
+            let parameters = topipe_tiling::Parameters { tile_size, ..source() };
             let tiling = tile(&part, &parameters, &Progress::silent()).unwrap();
             assert_eq!(topipe_tiling::verify(&tiling), [], "{name}, tile_size {tile_size}");
             let layout = layout(&tiling);
@@ -113,11 +123,11 @@ fn the_check_sees_what_is_wrong() {
 fn a_tiling_that_is_none_is_refused() {
     let mut broken = tiling("y-form");
     broken.tile_of_face.iter_mut().for_each(|t| t.0 /= 2);
-    let halved = match_quads(&broken, &Parameters::default(), &Progress::silent());
+    let halved = match_quads(&broken, &refined(), &Progress::silent());
     assert!(matches!(halved, Err(QuadMatchingError::Tiling(_))), "{:?}", halved.map(|_| ()));
     let mut short = tiling("y-form");
     short.tile_of_face.pop();
-    let short = match_quads(&short, &Parameters::default(), &Progress::silent());
+    let short = match_quads(&short, &refined(), &Progress::silent());
     assert_eq!(
         short.unwrap_err().to_string(),
         "the tiling can not be dualized: its arrays do not fit together"
@@ -127,7 +137,7 @@ fn a_tiling_that_is_none_is_refused() {
 #[test]
 fn a_limit_on_corner_angles_is_a_gate() {
     let tiling = tiling("y-form");
-    let parameters = Parameters { max_corner_angle: 95.0, ..Default::default() };
+    let parameters = Parameters { max_corner_angle: 95.0, ..refined() };
     let refused = match_quads(&tiling, &parameters, &Progress::silent());
     assert!(matches!(refused, Err(QuadMatchingError::ReflexCorner { .. })));
 }

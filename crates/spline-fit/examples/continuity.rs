@@ -36,26 +36,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = format!("fixtures/{name}/{name}.stl");
     let part = read(&path, &std::fs::read(&path)?, &ImportOptions::default())?;
     let part = topipe_smoothing::smooth(&part, &Default::default(), &silent)?;
-    let tiling = topipe_tiling::tile(
-        &part,
-        &topipe_tiling::Parameters {
-            method: topipe_tiling::Method::Bordered,
-            tile_size: std::env::var("SIZE")
-                .map_or(topipe_tiling::Parameters::default().tile_size, |t| t.parse().unwrap()),
-            normal_cone: std::env::var("CONE")
-                .map_or(topipe_tiling::Parameters::default().normal_cone, |t| t.parse().unwrap()),
-            ..Default::default()
-        },
-        &silent,
-    )?;
-    let layout = topipe_quad_matching::match_quads(
-        &tiling,
-        &topipe_quad_matching::Parameters {
-            pairing: topipe_quad_matching::Pairing::Midpoint,
-            ..Default::default()
-        },
-        &silent,
-    )?;
+    let tiling = topipe_tiling::tile(&part, &Default::default(), &silent)?;
+    let layout = topipe_quad_matching::match_quads(&tiling, &Default::default(), &silent)?;
     let start = Instant::now();
     let surface = fit(&layout, &parameters, &Units::none(), &Progress::new(Arc::new(Print)))?;
     println!(
@@ -127,32 +109,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     folded(&layout, &surface);
-    if let Ok(p) = std::env::var("PATCH").unwrap_or_default().parse::<usize>() {
-        let patch = &surface.patches[p];
-        let mesh = &layout.part.mesh;
-        let mut out = String::new();
-        for i in 0..=12 {
-            for j in 0..=12 {
-                let q = patch.evaluate(f64::from(i) / 12.0, f64::from(j) / 12.0).position;
-                out += &format!("s {} {} {}\n", q.x, q.y, q.z);
-            }
-        }
-        for (f, &q) in layout.quad_of_face.iter().enumerate() {
-            if q as usize == p {
-                for c in mesh.corners(topipe_mesh::FaceId::new(f)) {
-                    out += &format!("f {} {} {}\n", c.x, c.y, c.z);
-                }
-            }
-        }
-        for s in layout.quads[p] {
-            for v in &layout.edges[s.edge as usize].path {
-                let c = mesh.position(*v);
-                out += &format!("p {} {} {}\n", c.x, c.y, c.z);
-            }
-            out += "e 0 0 0\n";
-        }
-        std::fs::write("/tmp/patch.txt", out)?;
-    }
     Ok(())
 }
 

@@ -25,6 +25,9 @@ pub fn fit(
             sample(layout, quad, &faces[quad])
                 .ok_or_else(|| SplineFitError::Layout(format!("the faces of quad {quad} are not a disk")))
         })
+        // The first error in the order of the quads, for any number of threads.
+        .collect::<Vec<Result<PatchSamples, SplineFitError>>>()
+        .into_iter()
         .collect::<Result<_, _>>()?;
     match parameters.continuity {
         Continuity::Position => crate::position_fit::fit(layout, samples, parameters, progress),

@@ -97,7 +97,7 @@ pub(crate) fn local_surface(patches: &[&PatchSamples], at: DVec3, known: Known, 
                 }
             }
         }
-        if !(total > 0.0) {
+        if total.is_nan() || total <= 0.0 {
             return plane;
         }
         for (i, row) in a.iter_mut().enumerate() {
@@ -140,7 +140,7 @@ fn solve(mut a: [[f64; 6]; 6], mut b: [f64; 6]) -> Option<[f64; 6]> {
         let pivot = (k..6).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs()))?;
         a.swap(k, pivot);
         b.swap(k, pivot);
-        if !(a[k][k].abs() > 0.0) {
+        if a[k][k].is_nan() || a[k][k] == 0.0 {
             return None;
         }
         for i in k + 1..6 {

@@ -116,18 +116,10 @@ pub(crate) fn fit(
                 [sample.u, sample.v] = *place;
             }
         }
-        let (frames, curves) = network(&setting, &samples, refinement.spans())?;
-        let nets = patches(
-            &setting,
-            &mut samples,
-            &frames,
-            &curves,
-            refinement.spans(),
-            parameters,
-            units,
-            progress,
-        )?;
-        let mut surface = assemble(&setting, &frames, &curves, &nets);
+        let network = network(&setting, &samples, refinement.spans())?;
+        let nets =
+            patches(&setting, &mut samples, &network, refinement.spans(), parameters, units, progress)?;
+        let mut surface = assemble(&setting, &network, &nets);
         if !refinement.next(&setting, &surface, &samples, progress) {
             simplify(&mut surface, setting.borders.tolerance);
             return Ok(surface);
@@ -143,11 +135,17 @@ struct Curve {
 }
 
 /// Vertices and edges.
+struct Network {
+    frames: Frames,
+    curves: Vec<Curve>,
+}
+
+/// Finds vertices and edges.
 fn network(
     setting: &Setting<'_>,
     samples: &[PatchSamples],
     spans: &[usize],
-) -> Result<(Frames, Vec<Curve>), SplineFitError> {
+) -> Result<Network, SplineFitError> {
     let layout = setting.layout;
     let reach: Vec<f64> = setting.lengths.iter().zip(spans).map(|(l, &k)| REACH * l / k as f64).collect();
     let given = Given {
@@ -214,7 +212,7 @@ fn network(
         .enumerate()
         .map(|(e, curve)| curve.ok_or_else(|| singular(e)))
         .collect::<Result<_, _>>()?;
-    Ok((frames, curves))
+    Ok(Network { frames, curves })
 }
 
 /// Spans along the side of a patch.
@@ -226,8 +224,7 @@ fn side_spans(curve: &Curve, spans: usize) -> usize {
 fn patches(
     setting: &Setting<'_>,
     samples: &mut [PatchSamples],
-    frames: &Frames,
-    curves: &[Curve],
+    network: &Network,
     spans: &[usize],
     parameters: &Parameters,
     units: &Units,
@@ -236,13 +233,13 @@ fn patches(
     let layout = setting.layout;
     let borders: Vec<[Border; 4]> = (0..layout.quads.len())
         .into_par_iter()
-        .map(|quad| borders_of(setting, quad, curves, spans))
+        .map(|quad| borders_of(setting, quad, &network.curves, spans))
         .collect();
     let corners: Vec<[DVec3; 4]> = setting
         .sectors
         .at
         .iter()
-        .map(|sectors| sectors.map(|sector| frames.frames[sector as usize].surface.normal))
+        .map(|sectors| sectors.map(|sector| network.frames.frames[sector as usize].surface.normal))
         .collect();
     let keys: Vec<UnitKey> = if units.are_kept() {
         samples
@@ -281,6 +278,9 @@ fn patches(
             }
             Ok(net)
         })
+        // The first error in the order of the quads, for any number of threads.
+        .collect::<Vec<Result<Net, SplineFitError>>>()
+        .into_iter()
         .collect()
 }
 
@@ -371,20 +371,20 @@ fn borders_of(setting: &Setting<'_>, quad: usize, curves: &[Curve], spans: &[usi
     })
 }
 
-fn assemble(setting: &Setting<'_>, frames: &Frames, curves: &[Curve], nets: &[Net]) -> SplineSurface {
+fn assemble(setting: &Setting<'_>, network: &Network, nets: &[Net]) -> SplineSurface {
     let layout = setting.layout;
     let edge = |e: usize| match &setting.borders.curves[e] {
         Some(curve) => curve.clone(),
         None => EdgeCurve {
             ends: layout.edges[e].ends,
-            basis: hermite::basis(curves[e].control.len() / 2 - 1),
-            control: curves[e].control.clone(),
+            basis: hermite::basis(network.curves[e].control.len() / 2 - 1),
+            control: network.curves[e].control.clone(),
             feature: setting.features[e],
             shape: CurveShape::Spline,
         },
     };
     SplineSurface {
-        vertices: frames.positions.clone(),
+        vertices: network.frames.positions.clone(),
         edges: (0..layout.edges.len()).map(edge).collect(),
         patches: nets.iter().enumerate().map(|(quad, net)| patch(layout, quad, net)).collect(),
         faces: setting.borders.faces.clone(),

@@ -31,8 +31,15 @@ const HOLD: f64 = 1e-4;
 pub(crate) fn turning(surface: &LocalSurface, legs: &[Option<Leg>], closed: bool) -> Vec<Option<DVec3>> {
     let n = legs.len();
     let normal = surface.normal;
-    // Unit direction, unit direction across, curvature, torsion of the shape operator.
-    let data: Vec<Option<(DVec3, DVec3, f64, f64, f64)>> = legs
+    struct Datum {
+        along: DVec3,
+        across: DVec3,
+        curvature: f64,
+        /// Of the shape operator.
+        torsion: f64,
+        length: f64,
+    }
+    let data: Vec<Option<Datum>> = legs
         .iter()
         .map(|leg| {
             let leg = (*leg)?;
@@ -41,7 +48,7 @@ pub(crate) fn turning(surface: &LocalSurface, legs: &[Option<Leg>], closed: bool
             let across = normal.cross(along);
             let curvature = leg.second.dot(normal) / (length * length);
             let torsion = across.dot(surface.form * along);
-            Some((along, across, curvature, torsion, length))
+            Some(Datum { along, across, curvature, torsion, length })
         })
         .collect();
     let corners: Vec<(usize, usize)> = (0..n)
@@ -52,14 +59,14 @@ pub(crate) fn turning(surface: &LocalSurface, legs: &[Option<Leg>], closed: bool
     let mut right = vec![0.0; n];
     for (i, datum) in data.iter().enumerate() {
         matrix.add(i, i, HOLD);
-        if let Some((_, _, _, torsion, _)) = datum {
-            right[i] += HOLD * torsion;
+        if let Some(datum) = datum {
+            right[i] += HOLD * datum.torsion;
         }
     }
     for (i, j) in corners {
-        let (Some(a), Some(b)) = (data[i], data[j]) else { continue };
-        let (cos, sin) = (a.0.dot(b.0), a.1.dot(b.0));
-        let goal = (b.2 - a.2) * cos;
+        let (Some(a), Some(b)) = (&data[i], &data[j]) else { continue };
+        let (cos, sin) = (a.along.dot(b.along), a.across.dot(b.along));
+        let goal = (b.curvature - a.curvature) * cos;
         for row in [i, j] {
             right[row] += sin * goal;
             for column in [i, j] {
@@ -71,9 +78,9 @@ pub(crate) fn turning(surface: &LocalSurface, legs: &[Option<Leg>], closed: bool
     data.iter()
         .enumerate()
         .map(|(i, datum)| {
-            let (along, across, curvature, torsion, length) = (*datum)?;
-            let torsion = if solved { right[i] } else { torsion };
-            Some(-length * (curvature * along + torsion * across))
+            let datum = datum.as_ref()?;
+            let torsion = if solved { right[i] } else { datum.torsion };
+            Some(-datum.length * (datum.curvature * datum.along + torsion * datum.across))
         })
         .collect()
 }

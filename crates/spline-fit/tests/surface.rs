@@ -4,16 +4,28 @@ use topipe_mesh::import::{ImportOptions, read};
 use topipe_mesh::{Connectivity, DVec3, Part, TriangleMesh};
 use topipe_progress::{Progress, Units};
 use topipe_quad_matching::{QuadLayout, match_quads};
-use topipe_spline_fit::{Basis, Parameters, Patch, SplineFitError, SplineSurface, fit, shells, step};
+use topipe_spline_fit::{
+    Basis, Continuity, Parameters, Patch, SplineFitError, SplineSurface, fit, shells, step,
+};
 
 fn layout(part: &Part, tile_size: f64) -> QuadLayout {
-    let parameters = topipe_tiling::Parameters { tile_size, ..Default::default() };
+    let parameters = topipe_tiling::Parameters {
+        tile_size,
+        method: topipe_tiling::Method::AugmentedVoronoi,
+        ..Default::default()
+    };
     let tiling = topipe_tiling::tile(part, &parameters, &Progress::silent()).unwrap();
-    match_quads(&tiling, &Default::default(), &Progress::silent()).unwrap()
+    let parameters = topipe_quad_matching::Parameters {
+        pairing: topipe_quad_matching::Pairing::Refined,
+        ..Default::default()
+    };
+    match_quads(&tiling, &parameters, &Progress::silent()).unwrap()
 }
 
 fn fitted(layout: &QuadLayout) -> SplineSurface {
-    fit(layout, &Parameters::default(), &Units::none(), &Progress::silent()).unwrap()
+    // The source's fit; see tangency.rs for the other.
+    let parameters = Parameters { continuity: Continuity::Position, ..Default::default() };
+    fit(layout, &parameters, &Units::none(), &Progress::silent()).unwrap()
 }
 
 fn fixture(name: &str) -> Part {

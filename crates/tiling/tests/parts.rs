@@ -6,6 +6,11 @@ use topipe_mesh::{Part, TriangleMesh, VertexId};
 use topipe_progress::Progress;
 use topipe_tiling::{Parameters, TileId, Tiling, TilingError, Violation, tile, verify};
 
+/// The source's tessellation, of a closed surface.
+fn source() -> Parameters {
+    Parameters { method: topipe_tiling::Method::AugmentedVoronoi, ..Default::default() }
+}
+
 fn fixture(name: &str) -> Part {
     let ending = if name == "space-frame" { "off" } else { "stl" };
     let path = format!("{}/../../fixtures/{name}/{name}.{ending}", env!("CARGO_MANIFEST_DIR"));
@@ -51,13 +56,13 @@ fn every_reference_part_satisfies_all_conditions() {
         "monster-lite",
         "space-frame",
     ] {
-        tiled(&fixture(name), &Parameters::default());
+        tiled(&fixture(name), &source());
     }
 }
 
 #[test]
 fn the_number_of_tiles_is_about_what_was_asked_for() {
-    let tiling = tiled(&fixture("support"), &Parameters { tiles: 300, ..Default::default() });
+    let tiling = tiled(&fixture("support"), &Parameters { tiles: 300, ..source() });
     assert!((300..330).contains(&tiling.tile_count()), "{}", tiling.tile_count());
 }
 
@@ -65,7 +70,7 @@ fn the_number_of_tiles_is_about_what_was_asked_for() {
 fn a_mesh_that_is_too_coarse_is_refined() {
     // Nine squares: the smallest torus that is a simplicial complex. A simple dual of genus 1 needs seven tiles.
     let part = torus(3, 3, 0.4);
-    let tiling = tiled(&part, &Parameters { tile_size: 1000.0, ..Default::default() });
+    let tiling = tiled(&part, &Parameters { tile_size: 1000.0, ..source() });
     assert!(tiling.tile_count() >= 7);
     assert!(tiling.part.mesh.face_count() > part.mesh.face_count());
 }
@@ -80,17 +85,17 @@ fn shells_are_tiled_each_for_itself() {
     part.mesh
         .triangles
         .extend(inner.mesh.triangles.iter().map(|t| [t[1], t[0], t[2]].map(|v| VertexId(v.0 + count))));
-    tiled(&Part::new(part.mesh), &Parameters::default());
+    tiled(&Part::new(part.mesh), &source());
 }
 
 #[test]
 fn scaling_by_a_power_of_two_changes_nothing() {
     let part = fixture("y-form");
-    let reference = tiled(&part, &Parameters::default());
+    let reference = tiled(&part, &source());
     for scale in [1.0 / 1024.0, 1024.0] {
         let mut scaled = part.clone();
         scaled.mesh.positions.iter_mut().for_each(|p| *p *= scale);
-        let tiling = tiled(&scaled, &Parameters::default());
+        let tiling = tiled(&scaled, &source());
         assert_eq!(tiling.tile_of_face, reference.tile_of_face);
         assert_eq!(tiling.part.provenance, reference.part.provenance);
     }
@@ -98,7 +103,7 @@ fn scaling_by_a_power_of_two_changes_nothing() {
 
 #[test]
 fn the_check_sees_what_is_wrong() {
-    let good = tiled(&torus(24, 12, 0.4), &Parameters::default());
+    let good = tiled(&torus(24, 12, 0.4), &source());
     let mut hole = good.clone();
     // A face in the middle of a tile handed to another one.
     let connectivity = topipe_mesh::Connectivity::build(&good.part.mesh).unwrap();
@@ -135,22 +140,22 @@ fn bad_input_is_refused_with_a_reason() {
     };
     let part = torus(6, 6, 0.4);
     assert_eq!(
-        refuse(&part, Parameters { tile_size: 0.0, ..Default::default() }),
+        refuse(&part, Parameters { tile_size: 0.0, ..source() }),
         "tile_size = 0 is out of range: it must be greater than 0, at most 1000"
     );
     assert_eq!(
-        refuse(&part, Parameters { tiles: 3, ..Default::default() }),
+        refuse(&part, Parameters { tiles: 3, ..source() }),
         "tiles = 3 is out of range: it must be 0, or at least 4"
     );
     let mut open = part.clone();
     open.mesh.triangles.pop();
     let open = Part::new(open.mesh);
-    assert!(refuse(&open, Parameters::default()).starts_with("the mesh has 3 border edges"));
-    assert_eq!(refuse(&Part::default(), Parameters::default()), "the mesh can not be tiled: it has no faces");
+    assert!(refuse(&open, source()).starts_with("the mesh has 3 border edges"));
+    assert_eq!(refuse(&Part::default(), source()), "the mesh can not be tiled: it has no faces");
     let mut nan = part;
     nan.mesh.positions[0].x = f64::NAN;
     assert!(matches!(
-        tile(&nan, &Parameters::default(), &Progress::silent()),
+        tile(&nan, &source(), &Progress::silent()),
         Err(TilingError::Degenerate("a coordinate is not a finite number"))
     ));
 }
@@ -175,7 +180,7 @@ proptest! {
         }
         let faces = part.mesh.face_count();
         part.mesh.triangles.rotate_left(shift % faces);
-        let parameters = Parameters { tile_size: size, faces_per_tile: 8, ..Default::default() };
+        let parameters = Parameters { tile_size: size, faces_per_tile: 8, ..source() };
         if part.mesh.volume().abs() > 1e-6 {
             tiled(&part, &parameters);
         }

@@ -7,9 +7,17 @@ use topipe_quad_matching::{QuadLayout, match_quads};
 use topipe_spline_fit::{Patch, SplineSurface};
 
 pub(crate) fn layout(part: &Part, tile_size: f64) -> QuadLayout {
-    let parameters = topipe_tiling::Parameters { tile_size, ..Default::default() };
+    let parameters = topipe_tiling::Parameters {
+        tile_size,
+        method: topipe_tiling::Method::AugmentedVoronoi,
+        ..Default::default()
+    };
     let tiling = topipe_tiling::tile(part, &parameters, &Progress::silent()).unwrap();
-    match_quads(&tiling, &Default::default(), &Progress::silent()).unwrap()
+    let parameters = topipe_quad_matching::Parameters {
+        pairing: topipe_quad_matching::Pairing::Refined,
+        ..Default::default()
+    };
+    match_quads(&tiling, &parameters, &Progress::silent()).unwrap()
 }
 
 /// An octahedron divided `depth` times and pushed onto the unit sphere.
