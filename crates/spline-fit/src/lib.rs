@@ -6,12 +6,17 @@
 //! Regions of the layout that are faces of their own become trimmed planes and cylinders; their borders are exact curves
 //! that patches share.
 //!
-//! Guarantees: each quad gives one patch, each region face one analytic face; control points on shared edges are equal bit for bit, so the surface is
-//! watertight; the result does not depend on the number of threads. A part scaled by a power of two gives the same
-//! control points, scaled.
+//! The source's patches meet without gaps only ([`Continuity::Position`]). Here they also share their tangent planes: the
+//! vertices and the edges that are no features carry normals, found by local fits to the mesh, and every patch is fitted to
+//! them along its sides ([`Continuity::Tangent`], the default).
 //!
-//! Not guaranteed: tangent continuity across edges (C0 as in the source), a bound on the deviation, or that patches
-//! of quads with corners near 180 degrees are regular.
+//! Guarantees: each quad gives one patch, each region face one analytic face; patches share their border curves (bit for
+//! bit where their knots are the same, else with knots inserted), so the surface is watertight; the result does not depend
+//! on the number of threads.
+//!
+//! Not guaranteed: a bound on the normal jump or on the deviation. Knots are inserted while they help, up to
+//! `refinements` times; what remains is measured by validation. Patches of quads with corners near 180 degrees, or finer
+//! than the mesh, may fold.
 
 mod adapt;
 mod analytic_face;
