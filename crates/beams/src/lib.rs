@@ -8,7 +8,7 @@
 //! 4. The nearest standard profile is chosen by the weighted logarithmic error of these.
 //! 5. Beams that come too near to others, and beams that leave the part, are named.
 //!
-//! [`write`] has the files: JSON, CSV, DXF, a CalculiX deck and a STEP solid ([`solid`]).
+//! [`mod@write`] has the files: JSON, CSV, DXF, a CalculiX deck and a STEP solid ([`solid`]).
 //!
 //! Guarantees: a structure or a named error, never a panic; equal input gives equal bytes. Nodes of non-design parts stay
 //! where they are. As many independent loops as the skeleton has.

@@ -1,6 +1,6 @@
 //! The structure as closed solids: true cylinders (or prisms of the profiles) between convex joints.
 //!
-//! No surfaces are intersected. Each beam ends in planes across it, at collars of the joints ([`joint`] says how far from
+//! No surfaces are intersected. Each beam ends in planes across it, at collars of the joints (`joint` says how far from
 //! the node); a joint is the convex hull of its collars and a ball, so all its faces are triangles, and everything fits
 //! exactly. A free end, or an end at an interface, is cut off flat at its node: what is not the optimizer's is not
 //! modelled. Beams too short to have a joint at both ends become part of one joint.
