@@ -55,7 +55,7 @@ impl Default for Parameters {
         Self {
             continuity: Continuity::Tangent,
             spans: 2,
-            refinements: 3,
+            refinements: 1,
             tolerance: 1e-3,
             max_normal_jump: 0.1,
             degree: 3,
