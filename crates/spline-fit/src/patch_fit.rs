@@ -27,7 +27,8 @@ pub(crate) struct Border {
 const STATIONS: usize = 5;
 
 /// Weight of the squared angle to the prescribed normals (times the patch's area) against the mean squared distance
-/// to the samples. Largest jump on the bracket and mean deviation: see the table at `Parameters::tangency`.
+/// to the samples. Only its ratio to [`EVEN`] shows in the jumps: with 1e6 the largest jump on a sphere of 186 patches is
+/// 0.023 degrees at two spans and patches on a coarse torus fold, with 1e5 it is 0.027 and none does.
 const STIFF: f64 = 1e5;
 
 /// Weight, in the same terms, of the tangential part of the cross derivative against the one that goes evenly from
