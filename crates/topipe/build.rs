@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// Stage, its crate, and the file of its adapter in `stages` and of its writers in `export`. Pictures are no stage, they
 /// have a writer only.
-const PARTS: [(&str, &str, &str); 10] = [
+const PARTS: [(&str, &str, &str); 11] = [
     ("IMPORT", "mesh", "import.rs"),
     ("SMOOTHING", "smoothing", "smoothing.rs"),
     ("SMOOTHING_STUDY", "smoothing", "smoothing_study.rs"),
@@ -19,6 +19,7 @@ const PARTS: [(&str, &str, &str); 10] = [
     ("SPLINE_FIT", "spline-fit", "spline_fit.rs"),
     ("SKELETON", "skeleton", "skeleton.rs"),
     ("BEAMS", "beams", "beams.rs"),
+    ("STIFFNESS", "stiffness", "stiffness.rs"),
     ("VALIDATION", "validation", "validation.rs"),
     ("PICTURE", "render", "picture.rs"),
 ];

@@ -70,6 +70,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         layout: Some(&layout),
         surface: Some(&surface),
         skeleton: skeleton.as_ref(),
+        stiffness: None,
     };
     let report = validate(&inputs, &Default::default(), &silent)?;
     lap("validation");

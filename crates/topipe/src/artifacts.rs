@@ -32,6 +32,8 @@ kinds! {
     Beams = "beam structure" v 1: topipe_beams::Structure;
     /// A comparison of smoothing methods.
     Study = "smoothing study" v 1: topipe_smoothing::study::Study;
+    /// Compliances under the same loads.
+    Stiffness = "stiffness" v 1: topipe_stiffness::Stiffness;
     /// The figures of a validation.
-    Report = "report" v 2: topipe_validation::Report;
+    Report = "report" v 3: topipe_validation::Report;
 }

@@ -50,6 +50,7 @@ pub use report::{
     SmoothingFigures, SurfaceFigures,
 };
 pub use skeleton::{BranchPoint, bounding_sphere, off_center};
+pub use summary::stiffness_summary;
 pub use surface::volume_by_quadrature;
 
 use deviation::Surface;
@@ -58,6 +59,7 @@ use topipe_progress::Progress;
 use topipe_quad_matching::QuadLayout;
 use topipe_skeleton::Skeleton;
 use topipe_spline_fit::SplineSurface;
+use topipe_stiffness::Stiffness;
 
 /// What there is to validate.
 #[derive(Debug, Clone, Copy)]
@@ -72,12 +74,14 @@ pub struct Inputs<'a> {
     pub surface: Option<&'a SplineSurface>,
     /// The skeleton.
     pub skeleton: Option<&'a Skeleton>,
+    /// The comparison of stiffness, which is taken over as it is.
+    pub stiffness: Option<&'a Stiffness>,
 }
 
 impl<'a> Inputs<'a> {
     /// The original and nothing else.
     pub fn of(original: &'a Part) -> Self {
-        Self { original, mesh: None, layout: None, surface: None, skeleton: None }
+        Self { original, mesh: None, layout: None, surface: None, skeleton: None, stiffness: None }
     }
 }
 
@@ -162,5 +166,6 @@ pub fn validate(
         }
     };
     progress.step(sections, sections, "sections of the report");
-    Ok(Report { original: original_figures, smoothing, layout, surface, skeleton })
+    let stiffness = inputs.stiffness.cloned();
+    Ok(Report { original: original_figures, smoothing, layout, surface, skeleton, stiffness })
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use topipe_stiffness::Stiffness;
 
 /// All figures. A section is there when its artifact was given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -16,6 +17,8 @@ pub struct Report {
     pub surface: Option<SurfaceFigures>,
     /// The skeleton.
     pub skeleton: Option<SkeletonFigures>,
+    /// Compliance of all models under the same loads.
+    pub stiffness: Option<Stiffness>,
 }
 
 /// The part as imported.

@@ -2,6 +2,7 @@
 
 use crate::{DeviationFigures, Report};
 use std::fmt::Write;
+use topipe_stiffness::Stiffness;
 
 fn genus(genus: Option<i64>) -> String {
     genus.map_or_else(|| "unknown (open)".to_owned(), |g| g.to_string())
@@ -30,6 +31,30 @@ fn deviation(deviation: &DeviationFigures) -> String {
         figure(deviation.max_mm),
         figure(deviation.max_rel),
     )
+}
+
+/// A comparison of stiffness for the terminal: one line per model.
+pub fn stiffness_summary(stiffness: &Stiffness) -> String {
+    let mut text = format!(
+        "stiffness  {} load case{} on cells of {} mm\n",
+        stiffness.load_cases,
+        if stiffness.load_cases == 1 { "" } else { "s" },
+        figure(stiffness.cell)
+    );
+    for (name, f) in stiffness.models() {
+        let equal = f
+            .equal_volume_change
+            .map_or_else(String::new, |change| format!(", {:+.2} % at equal volume", 100.0 * change));
+        text += &format!(
+            "           {name}: compliance {} N mm ({:+.2} %{equal}), volume {} mm3, von Mises up to {} MPa, moves by {} mm\n",
+            figure(f.compliance),
+            100.0 * f.compliance_change,
+            figure(f.volume),
+            figure(f.max_von_mises),
+            figure(f.max_displacement)
+        );
+    }
+    text
 }
 
 impl Report {
@@ -207,6 +232,9 @@ impl Report {
                 s.cycles,
                 genus(s.genus)
             )?;
+        }
+        if let Some(stiffness) = &self.stiffness {
+            text.push_str(&stiffness_summary(stiffness));
         }
         Ok(())
     }

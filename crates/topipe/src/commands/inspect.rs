@@ -1,7 +1,7 @@
 //! `topipe inspect`.
 
 use crate::args::InspectArguments;
-use crate::artifacts::{Beams, Mesh, QuadLayout, Report, Skeleton, SplineSurface, Tiling};
+use crate::artifacts::{Beams, Mesh, QuadLayout, Report, Skeleton, SplineSurface, Stiffness, Tiling};
 use crate::display;
 use crate::failure::Failure;
 use std::fmt::Write;
@@ -70,6 +70,7 @@ fn artifact(header: &codec::Header, bytes: &[u8]) -> Result<String, Failure> {
                 let _ = writeln!(text, "{remark}");
             });
         }
+        Stiffness::NAME => text += &topipe_validation::stiffness_summary(&decode::<Stiffness>(bytes)?),
         Report::NAME => text += &decode::<Report>(bytes)?.summary(),
         _ => {}
     }

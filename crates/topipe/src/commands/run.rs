@@ -1,7 +1,7 @@
 //! `topipe run`.
 
 use crate::args::{RunArguments, Verbosity};
-use crate::artifacts::Report;
+use crate::artifacts::{Report, Stiffness};
 use crate::display::{self, Console, JsonLines};
 use crate::failure::Failure;
 use crate::stages::registry;
@@ -87,14 +87,24 @@ const USUAL_FIGURES: &[(&str, &str)] = &[
 /// The main figures of each report of the run.
 fn figures(record: &RunRecord, cache: &Cache) -> Vec<(String, String)> {
     let mut figures = Vec::new();
-    for stage in record.stages.iter().filter(|stage| stage.artifact_kind == Report::NAME) {
+    for stage in &record.stages {
         let Some(artifact) = stage.artifact else { continue };
         // A report that cannot be read now is told of by the next run.
-        let loaded = cache.load(&ArtifactType::of::<Report>(), artifact, &mut Vec::new());
-        if let Ok(Some(value)) = loaded
-            && let Some(report) = value.downcast_ref::<topipe_validation::Report>()
-        {
-            figures.push((stage.stage.clone(), report.summary()));
+        if stage.artifact_kind == Report::NAME {
+            let loaded = cache.load(&ArtifactType::of::<Report>(), artifact, &mut Vec::new());
+            if let Ok(Some(value)) = loaded
+                && let Some(report) = value.downcast_ref::<topipe_validation::Report>()
+            {
+                figures.push((stage.stage.clone(), report.summary()));
+            }
+        }
+        if stage.artifact_kind == Stiffness::NAME {
+            let loaded = cache.load(&ArtifactType::of::<Stiffness>(), artifact, &mut Vec::new());
+            if let Ok(Some(value)) = loaded
+                && let Some(stiffness) = value.downcast_ref::<topipe_stiffness::Stiffness>()
+            {
+                figures.push((stage.stage.clone(), topipe_validation::stiffness_summary(stiffness)));
+            }
         }
     }
     figures

@@ -10,6 +10,7 @@ mod skeleton;
 mod smoothing;
 mod smoothing_study;
 mod spline_fit;
+mod stiffness;
 mod validation;
 
 use topipe_engine::Exporter;
@@ -24,6 +25,7 @@ pub(crate) fn exporters() -> impl Iterator<Item = Exporter> {
         .chain(quad_matching::exporters())
         .chain(skeleton::exporters())
         .chain(beams::exporters())
+        .chain(stiffness::exporters())
         .chain(validation::exporters())
         .chain(picture::exporters())
 }

@@ -7,6 +7,7 @@ mod skeleton;
 mod smoothing;
 mod smoothing_study;
 mod spline_fit;
+mod stiffness;
 mod tiling;
 mod validation;
 
@@ -23,6 +24,7 @@ pub fn registry() -> Registry {
         .with_stage(spline_fit::SplineFit)
         .with_stage(skeleton::Skeleton)
         .with_stage(beams::Beams)
+        .with_stage(stiffness::CompareStiffness)
         .with_stage(validation::Validation)
         .with_exporters(crate::export::exporters())
 }
@@ -40,7 +42,7 @@ mod tests {
     use topipe_engine::{AnyStage, ContentHash, ParameterField, parameter_fields};
 
     /// Another value than the default, as TOML.
-    fn another(field: &ParameterField) -> String {
+    fn another(kind: &str, field: &ParameterField) -> String {
         let variants: Vec<&str> = field.type_name.split(" | ").collect();
         match (&field.default, field.type_name.as_str()) {
             (Value::Bool(value), _) => (!value).to_string(),
@@ -64,6 +66,12 @@ mod tests {
             (Value::Array(_), _) if field.name == "profiles" => {
                 "[{ name = \"bar\", shape = \"round\", dimensions = [7.3] }]".into()
             }
+            (Value::Array(_), _) if field.name == "supports" && kind == "stiffness" => {
+                "[{ region = { type = \"box\", min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] } }]".into()
+            }
+            (Value::Array(_), _) if field.name == "loads" && kind == "stiffness" => {
+                "[{ region = { type = \"feature\", near = [0.0, 0.0, 0.0] }, pressure = 1.0 }]".into()
+            }
             (Value::Array(_), _) if field.name == "supports" => "[{ at = [0.0, 0.0, 0.0] }]".into(),
             (Value::Array(_), _) if field.name == "loads" => {
                 "[{ at = [0.0, 0.0, 0.0], force = [1.0, 0.0, 0.0] }]".into()
@@ -84,7 +92,7 @@ mod tests {
             let default = resolved(stage.as_ref(), "");
             assert_eq!(default, stage.default_parameters());
             for field in parameter_fields(stage.as_ref()) {
-                let text = format!("{} = {}", field.name, another(&field));
+                let text = format!("{} = {}", field.name, another(stage.kind(), &field));
                 let edited = resolved(stage.as_ref(), &text);
                 assert_ne!(edited, default, "{}: {text}", stage.kind());
                 fields += 1;
@@ -161,7 +169,7 @@ mod tests {
                 expect(file.name.into(), keyed(stage, "", |_, files| drop(files.remove(file.name))));
             }
             for field in parameter_fields(stage) {
-                let text = format!("{} = {}", field.name, another(&field));
+                let text = format!("{} = {}", field.name, another(stage.kind(), &field));
                 expect(text.clone(), keyed(stage, &text, |_, _| {}));
                 // And what is inside of it.
                 let whole = resolved(stage, &text);
@@ -172,6 +180,7 @@ mod tests {
                 {
                     let changed = match &leaf {
                         Value::Bool(value) => Value::Bool(!value),
+                        Value::Number(number) if number.is_u64() => (number.as_u64().unwrap() + 1).into(),
                         Value::Number(number) => (number.as_f64().unwrap() + 0.125).into(),
                         _ => continue,
                     };
@@ -198,6 +207,7 @@ mod tests {
                 .filter(|(_, value)| !value.is_null())
                 .map(|(name, value)| (name.clone(), without_null(value)))
                 .collect(),
+            Value::Array(items) => items.iter().map(without_null).collect(),
             other => other.clone(),
         }
     }
@@ -224,6 +234,6 @@ mod tests {
         assert!(versions.iter().all(|version| version.len() == 16));
         versions.sort();
         versions.dedup();
-        assert_eq!(versions.len(), 9);
+        assert_eq!(versions.len(), 10);
     }
 }

@@ -1,6 +1,6 @@
 //! `kind = "validation"`.
 
-use crate::artifacts::{Mesh, QuadLayout, Report, Skeleton, SplineSurface};
+use crate::artifacts::{Mesh, QuadLayout, Report, Skeleton, SplineSurface, Stiffness};
 use topipe_engine::{InputPort, Stage, StageContext, StageError};
 use topipe_validation::{Inputs, Parameters, ValidationError, validate};
 
@@ -25,6 +25,7 @@ impl Stage for Validation {
             InputPort::optional::<QuadLayout>("layout", "The layout of quadrilaterals."),
             InputPort::optional::<SplineSurface>("surface", "The spline surface."),
             InputPort::optional::<Skeleton>("skeleton", "The skeleton."),
+            InputPort::optional::<Stiffness>("stiffness", "The comparison of stiffness, to be taken over."),
         ]
     }
 
@@ -38,12 +39,14 @@ impl Stage for Validation {
         let layout = context.optional_input::<QuadLayout>("layout")?;
         let surface = context.optional_input::<SplineSurface>("surface")?;
         let skeleton = context.optional_input::<Skeleton>("skeleton")?;
+        let stiffness = context.optional_input::<Stiffness>("stiffness")?;
         let inputs = Inputs {
             original: &original,
             mesh: mesh.as_deref(),
             layout: layout.as_deref(),
             surface: surface.as_deref(),
             skeleton: skeleton.as_deref(),
+            stiffness: stiffness.as_deref(),
         };
         validate(&inputs, parameters, context.progress()).map_err(|error| match error {
             ValidationError::Interrupted(_) => StageError::Interrupted,

@@ -1,0 +1,57 @@
+//! What can go wrong.
+
+use thiserror::Error;
+use topipe_fem::FemError;
+use topipe_progress::Interrupted;
+
+/// Why there are no figures.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum StiffnessError {
+    /// The load case or its equations.
+    #[error(transparent)]
+    Fem(FemError),
+    /// One of the models can not be solved.
+    #[error("{what}: {error}")]
+    Model {
+        /// Which.
+        what: String,
+        /// Why.
+        error: Box<FemError>,
+    },
+    /// The part encloses nothing.
+    #[error("the part encloses no volume; its faces must look outwards")]
+    NoVolume,
+    /// It was asked to stop.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+impl From<FemError> for StiffnessError {
+    fn from(error: FemError) -> Self {
+        match error {
+            FemError::Interrupted(interrupted) => Self::Interrupted(interrupted),
+            error => Self::Fem(error),
+        }
+    }
+}
+
+impl StiffnessError {
+    /// Whether a parameter is at fault, and not the part.
+    pub fn is_bad_parameter(&self) -> bool {
+        matches!(self.cause(), Some(FemError::Parameter { .. } | FemError::NoSupport | FemError::NoLoad))
+    }
+
+    /// Whether the numerics are at fault.
+    pub fn is_failure(&self) -> bool {
+        matches!(self.cause(), Some(FemError::NotConverged { .. }))
+    }
+
+    fn cause(&self) -> Option<&FemError> {
+        match self {
+            Self::Fem(error) => Some(error),
+            Self::Model { error, .. } => Some(error),
+            _ => None,
+        }
+    }
+}

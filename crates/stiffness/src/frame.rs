@@ -1,0 +1,188 @@
+//! The frame model of a beam structure, held and loaded where the solid is.
+//!
+//! Supports and loads act on surfaces of the solid, and the frame has none. Each connected patch of a supported or loaded
+//! surface is passed to one node: that of the non-design part it belongs to (the nearest one), or, in a structure without
+//! non-design parts, the nearest node. Forces keep their moment about that node, so that the frame is loaded by the same wrench.
+
+use topipe_beams::{Beam, NodeKind, Profile, Shape, Structure};
+use topipe_fem::frame::{Element, Frame, NodalLoad, Section};
+use topipe_fem::{Attachment, SurfacePoint};
+use topipe_mesh::DVec3;
+
+/// The frame model. `profiles` takes the standard profiles instead of the mean sections; `gap` (mm) is the distance between
+/// points of one patch at the most.
+pub(crate) fn model(
+    structure: &Structure,
+    attachment: &Attachment,
+    material: [f64; 2],
+    profiles: bool,
+    gap: f64,
+) -> Frame {
+    let [young, poisson] = material;
+    let mut frame = Frame { young, poisson, ..Frame::default() };
+    frame.nodes = structure.nodes.iter().map(|n| n.position).collect();
+    frame.links.clone_from(&structure.links);
+    for beam in &structure.beams {
+        let count = match beam.axis {
+            topipe_beams::Axis::Straight => 1,
+            topipe_beams::Axis::Spline(_) => 8 * structure.parameters.elements.max(1) as usize,
+        };
+        let line = structure.line(beam, count);
+        let mut previous = beam.ends[0];
+        for (k, p) in line.iter().enumerate().skip(1) {
+            let next = if k == count {
+                beam.ends[1]
+            } else {
+                frame.nodes.push(*p);
+                (frame.nodes.len() - 1) as u32
+            };
+            let section = section(beam, profiles, poisson);
+            // A piece of no length joins its nodes.
+            if frame.nodes[previous as usize].distance(frame.nodes[next as usize]) > 1e-9 * gap {
+                frame.elements.push(Element { nodes: [previous, next], section, axis: beam.section.axis });
+            } else {
+                frame.links.push([previous, next]);
+            }
+            previous = next;
+        }
+    }
+    for (points, directions) in &attachment.supports {
+        for patch in patches(points, gap) {
+            let node = node_for(structure, points, &patch);
+            if *directions == [true; 3] {
+                frame.clamped.push(node);
+            } else {
+                frame.held.push((node, *directions));
+            }
+        }
+    }
+    for (points, forces, case) in &attachment.loads {
+        for patch in patches(points, gap) {
+            let node = node_for(structure, points, &patch);
+            let at = structure.position(node);
+            let mut load = NodalLoad { node, force: DVec3::ZERO, moment: DVec3::ZERO, case: *case };
+            for k in patch {
+                load.force += forces[k];
+                load.moment += (points[k].point - at).cross(forces[k]);
+            }
+            frame.loads.push(load);
+        }
+    }
+    frame
+}
+
+fn node_for(structure: &Structure, points: &[SurfacePoint], patch: &[usize]) -> u32 {
+    let area: f64 = patch.iter().map(|&k| points[k].area).sum();
+    let middle = patch.iter().map(|&k| points[k].point * points[k].area).sum::<DVec3>() / area;
+    let nearest = |kind: Option<NodeKind>| {
+        let nodes =
+            structure.nodes.iter().enumerate().filter(|(_, n)| kind.is_none_or(|kind| n.kind == kind));
+        nodes
+            .map(|(v, n)| (n.position.distance_squared(middle), v as u32))
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+            .map(|(_, v)| v)
+    };
+    nearest(Some(NodeKind::NonDesign)).or_else(|| nearest(None)).unwrap_or(0)
+}
+
+/// Groups of points no farther apart than about `gap`, in the order of their first points.
+fn patches(points: &[SurfacePoint], gap: f64) -> Vec<Vec<usize>> {
+    // Points are put into boxes of that size; boxes that touch belong together.
+    let place = |p: DVec3| (p / gap).floor().to_array().map(|x| x as i64);
+    let mut boxes: std::collections::BTreeMap<[i64; 3], Vec<usize>> = std::collections::BTreeMap::new();
+    for (k, p) in points.iter().enumerate() {
+        boxes.entry(place(p.point)).or_default().push(k);
+    }
+    let mut done = std::collections::BTreeSet::new();
+    let mut groups = Vec::new();
+    for &start in boxes.keys() {
+        if !done.insert(start) {
+            continue;
+        }
+        let mut stack = vec![start];
+        let mut group = Vec::new();
+        while let Some(at) = stack.pop() {
+            group.extend(boxes.get(&at).into_iter().flatten().copied());
+            for k in 0..27 {
+                let next = [at[0] + k % 3 - 1, at[1] + k / 3 % 3 - 1, at[2] + k / 9 - 1];
+                if boxes.contains_key(&next) && done.insert(next) {
+                    stack.push(next);
+                }
+            }
+        }
+        group.sort_unstable();
+        groups.push(group);
+    }
+    groups.sort_by_key(|group| group.first().copied());
+    groups
+}
+
+/// Section of a beam. Shear areas are Cowper's (1966).
+fn section(beam: &Beam, profiles: bool, nu: f64) -> Section {
+    match &beam.profile {
+        Some(choice) if profiles => of_profile(&choice.profile, nu),
+        _ => {
+            let s = &beam.section;
+            let polar = 4.0 * s.moments[0] * s.moments[1] / (s.moments[0] + s.moments[1]);
+            let [high, wide] = s.diameters();
+            Section {
+                area: s.area,
+                moments: s.moments,
+                torsion: if s.torsion > 0.0 { s.torsion } else { polar },
+                shear: 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu),
+                fibres: [high / 2.0, wide / 2.0],
+                round: true,
+            }
+        }
+    }
+}
+
+fn of_profile(profile: &Profile, nu: f64) -> Section {
+    let p = profile.properties();
+    let d = &profile.dimensions;
+    let first = d.first().copied().unwrap_or(0.0);
+    let second = d.get(1).copied().unwrap_or(first);
+    let (shear, fibres) = match profile.shape {
+        Shape::Round => (6.0 * (1.0 + nu) / (7.0 + 6.0 * nu), [first, first]),
+        Shape::Tube => (2.0 * (1.0 + nu) / (4.0 + 3.0 * nu), [first, first]),
+        Shape::Square => (10.0 * (1.0 + nu) / (12.0 + 11.0 * nu), [first, first]),
+        Shape::Rectangle => (10.0 * (1.0 + nu) / (12.0 + 11.0 * nu), [first, second]),
+        Shape::SquareHollow => (20.0 * (1.0 + nu) / (48.0 + 39.0 * nu), [first, first]),
+        Shape::RectangularHollow => (20.0 * (1.0 + nu) / (48.0 + 39.0 * nu), [first, second]),
+        // The web carries the shear.
+        Shape::I => (d.get(2).map_or(0.3, |web| first * web / p.area).min(0.9), [first, second]),
+    };
+    let round = matches!(profile.shape, Shape::Round | Shape::Tube);
+    Section {
+        area: p.area,
+        moments: p.moments,
+        torsion: p.torsion,
+        shear,
+        fibres: fibres.map(|f| f / 2.0),
+        round,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patches_are_what_hangs_together() {
+        let point =
+            |x: f64, y: f64| SurfacePoint { point: DVec3::new(x, y, 0.0), normal: DVec3::Z, area: 1.0 };
+        let points: Vec<SurfacePoint> =
+            (0..40).map(|k| point(0.5 * (k % 20) as f64, if k < 20 { 0.0 } else { 7.0 })).collect();
+        let groups = patches(&points, 1.0);
+        assert_eq!(groups, vec![(0..20).collect::<Vec<_>>(), (20..40).collect()]);
+    }
+
+    #[test]
+    fn a_round_profile_is_the_round_section_of_its_area() {
+        let profile = Profile { name: "bar".into(), shape: Shape::Round, dimensions: vec![8.0] };
+        let s = of_profile(&profile, 0.3);
+        assert!((s.area - 16.0 * std::f64::consts::PI).abs() < 1e-12);
+        assert_eq!(s.fibres, [4.0, 4.0]);
+        assert!((s.torsion - 2.0 * s.moments[0]).abs() < 1e-9);
+    }
+}
