@@ -31,7 +31,7 @@ pub mod write;
 pub use error::BeamError;
 pub use parameters::{AxisForm, Load, Parameters, Sections, Support};
 pub use profile::{Choice, Profile, Properties, Shape};
-pub use structure::{Axis, Beam, Clearance, MeanSection, Node, NodeKind, Structure};
+pub use structure::{Axis, Beam, Clearance, MeanSection, Node, NodeKind, Station, Structure};
 pub use table::standard as standard_profiles;
 
 use glam::DVec3;
@@ -103,6 +103,7 @@ pub fn frame(
             ends: piece.ends,
             axis,
             section: piece.section,
+            stations: piece.stations,
             profile,
             rms: 0.0,
             bow: 0.0,
@@ -150,6 +151,7 @@ struct Piece {
     /// The points between its nodes.
     points: Vec<DVec3>,
     section: MeanSection,
+    stations: Vec<Station>,
 }
 
 struct Pieces {
@@ -207,6 +209,7 @@ fn divide(skeleton: &Skeleton, parameters: &Parameters) -> Pieces {
                 ends: [a, b],
                 points: line[from + 1..to.max(from + 1)].to_vec(),
                 section: mean_section(skeleton, part, direction),
+                stations: stations(skeleton, part, direction),
             });
             from = to;
         }
@@ -227,19 +230,24 @@ fn divide(skeleton: &Skeleton, parameters: &Parameters) -> Pieces {
 /// The mean over the length of a chain; the tensors of all sections are taken in the plane across `direction`.
 fn mean_section(skeleton: &Skeleton, chain: &[u32], direction: DVec3) -> MeanSection {
     let point = |k: usize| skeleton.points[chain[k] as usize];
+    let weighted = (0..chain.len()).map(|k| {
+        let before = if k > 0 { point(k - 1).distance(point(k)) } else { 0.0 };
+        let after = if k + 1 < chain.len() { point(k + 1).distance(point(k)) } else { 0.0 };
+        (before + after, &skeleton.sections[chain[k] as usize])
+    });
+    mean_of(weighted, direction)
+}
+
+/// The weighted mean of sections.
+fn mean_of<'a>(sections: impl Iterator<Item = (f64, &'a Section)>, direction: DVec3) -> MeanSection {
     let (u, v) = direction.any_orthonormal_pair();
     let (mut weight, mut area, mut square, mut torsion) = (0.0, 0.0, 0.0, 0.0);
     let (mut uu, mut vv, mut uv) = (0.0, 0.0, 0.0);
     let mut count = 0;
-    for k in 0..chain.len() {
-        let Section::Plane { area: a, normal, moments: [large, small], axis, torsion: j } =
-            skeleton.sections[chain[k] as usize]
-        else {
+    for (w, section) in sections {
+        let &Section::Plane { area: a, normal, moments: [large, small], axis, torsion: j } = section else {
             continue;
         };
-        let before = if k > 0 { point(k - 1).distance(point(k)) } else { 0.0 };
-        let after = if k + 1 < chain.len() { point(k + 1).distance(point(k)) } else { 0.0 };
-        let w = before + after;
         let other = normal.cross(axis);
         let about =
             |p: DVec3, q: DVec3| large * axis.dot(p) * axis.dot(q) + small * other.dot(p) * other.dot(q);
@@ -266,6 +274,23 @@ fn mean_section(skeleton: &Skeleton, chain: &[u32], direction: DVec3) -> MeanSec
         variation: (square - area * area).max(0.0).sqrt() / area,
         count,
     }
+}
+
+/// The sections along a chain, each with its tensor in the plane across `direction`.
+fn stations(skeleton: &Skeleton, chain: &[u32], direction: DVec3) -> Vec<Station> {
+    let mut along = vec![0.0];
+    for pair in chain.windows(2) {
+        let [p, q] = [pair[0], pair[1]].map(|p| skeleton.points[p as usize]);
+        along.push(along[along.len() - 1] + p.distance(q));
+    }
+    let length = along[along.len() - 1];
+    (0..chain.len())
+        .filter(|&k| matches!(skeleton.sections[chain[k] as usize], Section::Plane { .. }))
+        .map(|k| {
+            let section = mean_of([(1.0, &skeleton.sections[chain[k] as usize])].into_iter(), direction);
+            Station { at: if length > 0.0 { along[k] / length } else { 0.5 }, section }
+        })
+        .collect()
 }
 
 /// Pieces without a section take that of the largest beam beside them, again and again.

@@ -84,6 +84,15 @@ impl MeanSection {
     }
 }
 
+/// A measured section along a beam.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Station {
+    /// Where it is: share of the beam's length from its first node, 0 to 1.
+    pub at: f64,
+    /// The section, in the plane across the chord of the beam; its count is 1.
+    pub section: MeanSection,
+}
+
 /// One beam.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Beam {
@@ -93,6 +102,8 @@ pub struct Beam {
     pub axis: Axis,
     /// Its mean section.
     pub section: MeanSection,
+    /// The sections it is the mean of, from the first node to the last.
+    pub stations: Vec<Station>,
     /// The nearest standard profile, if there is a table.
     pub profile: Option<Choice>,
     /// Root mean square distance of the skeleton's points from the axis, mm.
@@ -212,9 +223,14 @@ impl Structure {
             }
         };
         distance = distance.min(at.distance(position));
+        let stations = |low: f64, high: f64| -> Vec<Station> {
+            let inside = beam.stations.iter().filter(|s| s.at >= low && s.at <= high);
+            inside.map(|s| Station { at: (s.at - low) / (high - low).max(f64::MIN_POSITIVE), ..*s }).collect()
+        };
+        let (before, after) = (stations(0.0, t), stations(t, 1.0));
         self.nodes.push(Node { position, kind: NodeKind::Bend });
-        self.beams.push(Beam { ends: [n, beam.ends[1]], axis: second, ..beam.clone() });
-        self.beams[b] = Beam { ends: [beam.ends[0], n], axis: first, ..beam };
+        self.beams.push(Beam { ends: [n, beam.ends[1]], axis: second, stations: after, ..beam.clone() });
+        self.beams[b] = Beam { ends: [beam.ends[0], n], axis: first, stations: before, ..beam };
         Some((n, distance, radius))
     }
 

@@ -21,7 +21,7 @@ pub struct Stiffness {
     pub smoothed: Option<Figures>,
     /// The spline surface.
     pub surface: Option<Figures>,
-    /// The frame of beams with their mean sections.
+    /// The frame of beams with the sections measured along them.
     pub frame: Option<Figures>,
     /// The frame of beams with standard profiles.
     pub frame_profiles: Option<Figures>,

@@ -4,7 +4,7 @@
 //! surface is passed to one node: that of the non-design part it belongs to (the nearest one), or, in a structure without
 //! non-design parts, the nearest node. Forces keep their moment about that node, so that the frame is loaded by the same wrench.
 
-use topipe_beams::{Beam, NodeKind, Profile, Shape, Structure};
+use topipe_beams::{Beam, MeanSection, NodeKind, Profile, Shape, Structure};
 use topipe_fem::frame::{Element, Frame, NodalLoad, Section};
 use topipe_fem::{Attachment, SurfacePoint};
 use topipe_mesh::DVec3;
@@ -23,23 +23,22 @@ pub(crate) fn model(
     frame.nodes = structure.nodes.iter().map(|n| n.position).collect();
     frame.links.clone_from(&structure.links);
     for beam in &structure.beams {
-        let count = match beam.axis {
-            topipe_beams::Axis::Straight => 1,
-            topipe_beams::Axis::Spline(_) => 8 * structure.parameters.elements.max(1) as usize,
+        let fine = structure.line(beam, 256);
+        let at = |t: f64| {
+            let k = ((t * 256.0) as usize).min(255);
+            fine[k].lerp(fine[k + 1], t * 256.0 - k as f64)
         };
-        let line = structure.line(beam, count);
         let mut previous = beam.ends[0];
-        for (k, p) in line.iter().enumerate().skip(1) {
-            let next = if k == count {
+        for (end, section, axis) in steps(structure, beam, profiles, poisson) {
+            let next = if end >= 1.0 {
                 beam.ends[1]
             } else {
-                frame.nodes.push(*p);
+                frame.nodes.push(at(end));
                 (frame.nodes.len() - 1) as u32
             };
-            let section = section(beam, profiles, poisson);
             // A piece of no length joins its nodes.
             if frame.nodes[previous as usize].distance(frame.nodes[next as usize]) > 1e-9 * gap {
-                frame.elements.push(Element { nodes: [previous, next], section, axis: beam.section.axis });
+                frame.elements.push(Element { nodes: [previous, next], section, axis });
             } else {
                 frame.links.push([previous, next]);
             }
@@ -117,23 +116,49 @@ fn patches(points: &[SurfacePoint], gap: f64) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Section of a beam. Shear areas are Cowper's (1966).
-fn section(beam: &Beam, profiles: bool, nu: f64) -> Section {
-    match &beam.profile {
-        Some(choice) if profiles => of_profile(&choice.profile, nu),
-        _ => {
-            let s = &beam.section;
-            let polar = 4.0 * s.moments[0] * s.moments[1] / (s.moments[0] + s.moments[1]);
-            let [high, wide] = s.diameters();
-            Section {
-                area: s.area,
-                moments: s.moments,
-                torsion: if s.torsion > 0.0 { s.torsion } else { polar },
-                shear: 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu),
-                fibres: [high / 2.0, wide / 2.0],
-                round: true,
+/// The pieces of a beam: where each ends (share of the length), its section and the axis of its larger moment. With measured
+/// sections a piece is what is nearer to one station than to the next. A mean over the length would be too stiff: where a
+/// member is thin it gives way more than it holds out where it is thick.
+fn steps(structure: &Structure, beam: &Beam, profiles: bool, poisson: f64) -> Vec<(f64, Section, DVec3)> {
+    let mut ends = vec![1.0];
+    if let topipe_beams::Axis::Spline(_) = beam.axis {
+        let count = 8 * structure.parameters.elements.max(1);
+        ends.extend((1..count).map(|k| f64::from(k) / f64::from(count)));
+    }
+    let profile = beam.profile.as_ref().filter(|_| profiles);
+    if profile.is_none() {
+        ends.extend(beam.stations.windows(2).map(|s| 0.5 * (s[0].at + s[1].at)));
+    }
+    ends.sort_by(f64::total_cmp);
+    ends.dedup_by(|b, a| *b - *a < 1e-9);
+    let mut from = 0.0;
+    ends.retain(|end| *end > 1e-9);
+    ends.iter()
+        .map(|&end| {
+            let middle = 0.5 * (from + end);
+            from = end;
+            let station =
+                beam.stations.iter().min_by(|a, b| (a.at - middle).abs().total_cmp(&(b.at - middle).abs()));
+            let measured = station.map_or(&beam.section, |s| &s.section);
+            match profile {
+                Some(choice) => (end, of_profile(&choice.profile, poisson), beam.section.axis),
+                None => (end, measured_section(measured, poisson), measured.axis),
             }
-        }
+        })
+        .collect()
+}
+
+/// A measured section as the ellipse of its area and ratio of moments. Shear areas are Cowper's (1966).
+fn measured_section(s: &MeanSection, nu: f64) -> Section {
+    let polar = 4.0 * s.moments[0] * s.moments[1] / (s.moments[0] + s.moments[1]);
+    let [high, wide] = s.diameters();
+    Section {
+        area: s.area,
+        moments: s.moments,
+        torsion: if s.torsion > 0.0 { s.torsion } else { polar },
+        shear: 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu),
+        fibres: [high / 2.0, wide / 2.0],
+        round: true,
     }
 }
 

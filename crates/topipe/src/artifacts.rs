@@ -29,7 +29,7 @@ kinds! {
     /// A curve skeleton.
     Skeleton = "skeleton" v 2: topipe_skeleton::Skeleton;
     /// Beams between shared nodes.
-    Beams = "beam structure" v 1: topipe_beams::Structure;
+    Beams = "beam structure" v 2: topipe_beams::Structure;
     /// A comparison of smoothing methods.
     Study = "smoothing study" v 1: topipe_smoothing::study::Study;
     /// Compliances under the same loads.
