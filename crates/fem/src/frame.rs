@@ -37,6 +37,34 @@ pub struct Element {
     pub axis: DVec3,
 }
 
+/// Springs between two nodes at the same place, one of which may belong to a rigid body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joint {
+    /// The nodes.
+    pub nodes: [u32; 2],
+    /// The direction of the first of each pair of stiffnesses: unit.
+    pub along: DVec3,
+    /// Against displacement along and across, N/mm.
+    pub displacement: [f64; 2],
+    /// Against turns about and across, N mm.
+    pub turn: [f64; 2],
+}
+
+impl Joint {
+    /// The foot of a beam on an elastic body: a rigid disk of the beam's area on a half-space (Johnson 1985, chapter 3, for
+    /// displacement along and turn across; Mindlin and Reissner-Sagoci for the others).
+    pub fn foot(nodes: [u32; 2], along: DVec3, area: f64, young: f64, poisson: f64) -> Self {
+        let radius = (area / std::f64::consts::PI).sqrt();
+        let (plane, shear) = (young / (1.0 - poisson * poisson), young / (2.0 * (1.0 + poisson)));
+        Self {
+            nodes,
+            along,
+            displacement: [2.0 * plane * radius, 8.0 * shear * radius / (2.0 - poisson)],
+            turn: [16.0 / 3.0 * shear * radius.powi(3), 4.0 / 3.0 * plane * radius.powi(3)],
+        }
+    }
+}
+
 /// Forces and moments on a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NodalLoad {
@@ -61,6 +89,8 @@ pub struct Frame {
     pub nodes: Vec<DVec3>,
     /// Beams.
     pub elements: Vec<Element>,
+    /// Springs.
+    pub joints: Vec<Joint>,
     /// Pairs of nodes that move as one body.
     pub links: Vec<[u32; 2]>,
     /// Nodes that are clamped.
@@ -112,7 +142,9 @@ impl Frame {
         if self.loads.is_empty() {
             return Err(FemError::NoLoad);
         }
-        let pairs = self.elements.iter().map(|e| e.nodes).chain(self.links.iter().copied());
+        let pairs = (self.elements.iter().map(|e| e.nodes))
+            .chain(self.joints.iter().map(|j| j.nodes))
+            .chain(self.links.iter().copied());
         let singles = self.clamped.iter().copied().chain(self.held.iter().map(|h| h.0));
         let mut named = pairs.flatten().chain(singles).chain(self.loads.iter().map(|l| l.node));
         if let Some(node) = named.find(|&v| v as usize >= n) {
@@ -149,8 +181,8 @@ impl Frame {
         let arm = |v: u32| self.nodes[v as usize] - self.nodes[body[v as usize]];
         let mut neighbors = vec![Vec::new(); references.len()];
         let mut used = vec![false; references.len()];
-        for e in &self.elements {
-            let [a, b] = e.nodes.map(of);
+        for nodes in self.elements.iter().map(|e| e.nodes).chain(self.joints.iter().map(|j| j.nodes)) {
+            let [a, b] = nodes.map(of);
             used[a] = true;
             used[b] = true;
             neighbors[a].push(b as u32);
@@ -162,9 +194,12 @@ impl Frame {
         let ordering = Ordering::new(&neighbors);
         let mut matrix = ordering.matrix(6);
         let mut stiffest = 0.0f64;
-        for e in &self.elements {
-            let k = self.global_stiffness(e, e.nodes.map(arm));
-            let bodies = e.nodes.map(of);
+        let beams = self.elements.iter().map(|e| (e.nodes, self.local_stiffness(e), self.axes(e)));
+        let joints =
+            self.joints.iter().map(|j| (j.nodes, joint_stiffness(j), frame_along(j.along, DVec3::ZERO)));
+        for (nodes, local, axes) in beams.chain(joints) {
+            let k = global_stiffness(&local, axes, nodes.map(arm));
+            let bodies = nodes.map(of);
             for i in 0..12 {
                 stiffest = stiffest.max(k[i][i]);
                 for j in 0..12 {
@@ -260,10 +295,7 @@ impl Frame {
     /// Columns are the axes of a beam: along it, the axis of its first moment, across both.
     fn axes(&self, element: &Element) -> DMat3 {
         let [a, b] = element.nodes.map(|n| self.nodes[n as usize]);
-        let along = (b - a).normalize_or(DVec3::X);
-        let across = element.axis.reject_from_normalized(along).try_normalize();
-        let across = across.unwrap_or_else(|| along.any_orthonormal_vector());
-        DMat3::from_cols(along, across, along.cross(across))
+        frame_along((b - a).normalize_or(DVec3::X), element.axis)
     }
 
     /// In the axes of the beam: displacement and turn of the first node, then of the second.
@@ -304,42 +336,6 @@ impl Frame {
         k
     }
 
-    /// From the unknowns of the bodies to the displacements of the ends in the axes of the beam.
-    fn transformation(&self, element: &Element, arms: [DVec3; 2]) -> [[f64; 12]; 12] {
-        let axes = self.axes(element).transpose();
-        let mut t = [[0.0; 12]; 12];
-        for (end, arm) in arms.into_iter().enumerate() {
-            for d in 0..3 {
-                let moved = axes.col(d);
-                // Turn about axis d moves the end by axis x arm.
-                let turned = axes * DVec3::AXES[d].cross(arm);
-                for c in 0..3 {
-                    t[6 * end + c][6 * end + d] = moved[c];
-                    t[6 * end + c][6 * end + 3 + d] = turned[c];
-                    t[6 * end + 3 + c][6 * end + 3 + d] = moved[c];
-                }
-            }
-        }
-        t
-    }
-
-    fn global_stiffness(&self, element: &Element, arms: [DVec3; 2]) -> [[f64; 12]; 12] {
-        let (k, t) = (self.local_stiffness(element), self.transformation(element, arms));
-        let mut half = [[0.0; 12]; 12];
-        let mut whole = [[0.0; 12]; 12];
-        for i in 0..12 {
-            for j in 0..12 {
-                half[i][j] = (0..12).map(|m| k[i][m] * t[m][j]).sum();
-            }
-        }
-        for i in 0..12 {
-            for j in 0..12 {
-                whole[i][j] = (0..12).map(|m| t[m][i] * half[m][j]).sum();
-            }
-        }
-        whole
-    }
-
     /// The largest von Mises stress at the ends of a beam: normal force and bending at the outermost fibre, with torsion.
     fn stress(&self, element: &Element, displacements: &[[DVec3; 2]]) -> f64 {
         let axes = self.axes(element).transpose();
@@ -364,6 +360,61 @@ impl Frame {
         };
         at(0).max(at(1))
     }
+}
+
+/// Columns: `along`, the part of `axis` across it, and across both.
+fn frame_along(along: DVec3, axis: DVec3) -> DMat3 {
+    let along = along.normalize_or(DVec3::X);
+    let across = axis.reject_from_normalized(along).try_normalize();
+    let across = across.unwrap_or_else(|| along.any_orthonormal_vector());
+    DMat3::from_cols(along, across, along.cross(across))
+}
+
+fn joint_stiffness(joint: &Joint) -> [[f64; 12]; 12] {
+    let [along, across] = joint.displacement;
+    let [about, over] = joint.turn;
+    let mut k = [[0.0; 12]; 12];
+    for (i, value) in [along, across, across, about, over, over].into_iter().enumerate() {
+        (k[i][i], k[i + 6][i + 6]) = (value, value);
+        (k[i][i + 6], k[i + 6][i]) = (-value, -value);
+    }
+    k
+}
+
+/// From the unknowns of the bodies to the displacements of the ends in the given axes; the ends stand on arms.
+fn transformation(axes: DMat3, arms: [DVec3; 2]) -> [[f64; 12]; 12] {
+    let axes = axes.transpose();
+    let mut t = [[0.0; 12]; 12];
+    for (end, arm) in arms.into_iter().enumerate() {
+        for d in 0..3 {
+            let moved = axes.col(d);
+            // Turn about axis d moves the end by axis x arm.
+            let turned = axes * DVec3::AXES[d].cross(arm);
+            for c in 0..3 {
+                t[6 * end + c][6 * end + d] = moved[c];
+                t[6 * end + c][6 * end + 3 + d] = turned[c];
+                t[6 * end + 3 + c][6 * end + 3 + d] = moved[c];
+            }
+        }
+    }
+    t
+}
+
+fn global_stiffness(k: &[[f64; 12]; 12], axes: DMat3, arms: [DVec3; 2]) -> [[f64; 12]; 12] {
+    let t = transformation(axes, arms);
+    let mut half = [[0.0; 12]; 12];
+    let mut whole = [[0.0; 12]; 12];
+    for i in 0..12 {
+        for j in 0..12 {
+            half[i][j] = (0..12).map(|m| k[i][m] * t[m][j]).sum();
+        }
+    }
+    for i in 0..12 {
+        for j in 0..12 {
+            whole[i][j] = (0..12).map(|m| t[m][i] * half[m][j]).sum();
+        }
+    }
+    whole
 }
 
 #[cfg(test)]
@@ -453,6 +504,21 @@ mod tests {
         propped.loads = vec![tip(DVec3::ZERO, DVec3::new(0.0, 0.0, 10.0))];
         let exact = 100.0 * 400.0 / (4.0 * 70_000.0 * s.moments[0]);
         assert!((propped.solve().unwrap().compliance() / exact - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_foot_gives_way_by_what_its_springs_do() {
+        let (s, l) = (round(4.0), 30.0);
+        let mut frame = beam(DVec3::new(l, 0.0, 0.0), s, DVec3::Y);
+        frame.loads = vec![tip(DVec3::new(0.0, 0.0, 7.0), DVec3::ZERO)];
+        let clamped = frame.solve().unwrap().compliance();
+        frame.nodes.push(frame.nodes[0]);
+        frame.clamped = vec![2];
+        let foot = Joint::foot([2, 0], DVec3::X, s.area, 70_000.0, 0.3);
+        frame.joints = vec![foot];
+        let soft = frame.solve().unwrap().compliance();
+        let expected = 49.0 * (1.0 / foot.displacement[1] + l * l / foot.turn[1]);
+        assert!(((soft - clamped) / expected - 1.0).abs() < 1e-9);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! non-design parts, the nearest node. Forces keep their moment about that node, so that the frame is loaded by the same wrench.
 
 use topipe_beams::{Beam, MeanSection, NodeKind, Profile, Shape, Structure};
-use topipe_fem::frame::{Element, Frame, NodalLoad, Section};
+use topipe_fem::frame::{Element, Frame, Joint, NodalLoad, Section};
 use topipe_fem::{Attachment, SurfacePoint};
 use topipe_mesh::DVec3;
 
@@ -21,7 +21,30 @@ pub(crate) fn model(
     let [young, poisson] = material;
     let mut frame = Frame { young, poisson, ..Frame::default() };
     frame.nodes = structure.nodes.iter().map(|n| n.position).collect();
-    frame.links.clone_from(&structure.links);
+    // An interface stands on its non-design part, which gives way beneath it.
+    for &[a, b] in &structure.links {
+        let is_part = |v: u32| structure.nodes[v as usize].kind == NodeKind::NonDesign;
+        let (foot, part) = if is_part(a) { (b, a) } else { (a, b) };
+        let beams = structure.beams.iter().filter(|beam| beam.ends.contains(&foot));
+        let largest = beams.max_by(|x, y| x.section.area.total_cmp(&y.section.area));
+        match largest.filter(|_| is_part(part)) {
+            Some(beam) => {
+                let [p, q] = beam.ends.map(|v| structure.position(v));
+                let area = end_area(beam, foot, profiles);
+                let copy = frame.nodes.len() as u32;
+                frame.nodes.push(structure.position(foot));
+                frame.links.push([part, copy]);
+                frame.joints.push(Joint::foot(
+                    [copy, foot],
+                    (q - p).normalize_or(DVec3::X),
+                    area,
+                    young,
+                    poisson,
+                ));
+            }
+            None => frame.links.push([a, b]),
+        }
+    }
     for beam in &structure.beams {
         let fine = structure.line(beam, 256);
         let at = |t: f64| {
@@ -114,6 +137,15 @@ fn patches(points: &[SurfacePoint], gap: f64) -> Vec<Vec<usize>> {
     }
     groups.sort_by_key(|group| group.first().copied());
     groups
+}
+
+/// Area of a beam where it meets a node.
+fn end_area(beam: &Beam, node: u32, profiles: bool) -> f64 {
+    let station = if beam.ends[0] == node { beam.stations.first() } else { beam.stations.last() };
+    match &beam.profile {
+        Some(choice) if profiles => choice.profile.properties().area,
+        _ => station.map_or(beam.section.area, |s| s.section.area),
+    }
 }
 
 /// The pieces of a beam: where each ends (share of the length), its section and the axis of its larger moment. With measured
