@@ -4,6 +4,7 @@
 //! outgoing half-edge per vertex: 16 bytes a triangle, built by one counting sort in linear time.
 
 use crate::{FaceId, HalfEdgeId, TriangleMesh, VertexId};
+use rayon::prelude::*;
 use thiserror::Error;
 
 /// Which half-edges are twins, and one outgoing half-edge per vertex.
@@ -60,6 +61,33 @@ pub enum ConnectivityError {
     },
 }
 
+/// Vertices per task.
+const GRAIN: usize = 4096;
+
+/// A half-edge as its lower vertex sees it.
+#[derive(Clone, Copy)]
+struct Ascent {
+    high: VertexId,
+    half_edge: HalfEdgeId,
+    /// Whether it leaves the lower vertex.
+    up: bool,
+}
+
+/// All vertices exist, and no triangle uses one twice.
+fn check_triangles(mesh: &TriangleMesh) -> Result<(), ConnectivityError> {
+    let count = mesh.vertex_count();
+    let problem = |t: &[VertexId; 3]| (0..3).find(|&k| t[k].index() >= count || t[k] == t[(k + 1) % 3]);
+    let bad = mesh.triangles.par_iter().with_min_len(GRAIN).position_first(|t| problem(t).is_some());
+    let Some(f) = bad else { return Ok(()) };
+    let t = &mesh.triangles[f];
+    let vertex = problem(t).map_or(VertexId::NONE, |k| t[k]);
+    Err(if vertex.index() >= count {
+        ConnectivityError::VertexOutOfRange { face: f as u32, vertex: vertex.0, count }
+    } else {
+        ConnectivityError::RepeatedVertex { face: f as u32, vertex: vertex.0 }
+    })
+}
+
 impl Connectivity {
     /// Connects the triangles of `mesh`.
     ///
@@ -68,64 +96,57 @@ impl Connectivity {
     pub fn build(mesh: &TriangleMesh) -> Result<Self, ConnectivityError> {
         let vertex_count = mesh.vertex_count();
         let half_edges = mesh.face_count() * 3;
-        let mut origin = Vec::with_capacity(half_edges);
-        // Half-edges are bucketed by the smaller of their two vertices: twins land in the same small bucket.
-        let mut start = vec![0u32; vertex_count + 1];
-        for (f, triangle) in mesh.triangles.iter().enumerate() {
+        check_triangles(mesh)?;
+        let origin = mesh.triangles.as_flattened().to_vec();
+        // Half-edges are bucketed by the smaller of their two vertices: twins land in the same small bucket. An entry
+        // carries all that matching asks for, so that it reads memory in order.
+        let mut fill = vec![0u32; vertex_count + 1];
+        for t in &mesh.triangles {
             for k in 0..3 {
-                let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
-                if a.index() >= vertex_count {
-                    return Err(ConnectivityError::VertexOutOfRange {
-                        face: f as u32,
-                        vertex: a.0,
-                        count: vertex_count,
-                    });
-                }
-                if a == b {
-                    return Err(ConnectivityError::RepeatedVertex { face: f as u32, vertex: a.0 });
-                }
-                origin.push(a);
-            }
-            for k in 0..3 {
-                start[triangle[k].min(triangle[(k + 1) % 3]).index() + 1] += 1;
+                fill[t[k].min(t[(k + 1) % 3]).index() + 1] += 1;
             }
         }
         for v in 0..vertex_count {
-            start[v + 1] += start[v];
+            fill[v + 1] += fill[v];
         }
-        let mut bucket = vec![HalfEdgeId::NONE; half_edges];
-        let mut fill = start.clone();
-        for h in 0..half_edges {
-            let h = HalfEdgeId::new(h);
-            let low = origin[h.index()].min(origin[h.next().index()]);
-            bucket[fill[low.index()] as usize] = h;
-            fill[low.index()] += 1;
+        let mut bucket =
+            vec![Ascent { high: VertexId::NONE, half_edge: HalfEdgeId::NONE, up: false }; half_edges];
+        for (f, t) in mesh.triangles.iter().enumerate() {
+            for k in 0..3 {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                let slot = &mut fill[a.min(b).index()];
+                bucket[*slot as usize] =
+                    Ascent { high: a.max(b), half_edge: HalfEdgeId::of(FaceId::new(f), k), up: a < b };
+                *slot += 1;
+            }
         }
         let mut twin = vec![HalfEdgeId::NONE; half_edges];
+        let mut first = 0;
         for v in 0..vertex_count {
-            let members = &bucket[start[v] as usize..start[v + 1] as usize];
-            for (i, &h) in members.iter().enumerate() {
-                let (a, b) = (origin[h.index()], origin[h.next().index()]);
-                for &g in &members[i + 1..] {
-                    let (c, d) = (origin[g.index()], origin[g.next().index()]);
-                    let opposite = (a, b) == (d, c);
-                    if (a, b) == (c, d)
-                        || (opposite && (twin[h.index()].is_some() || twin[g.index()].is_some()))
-                    {
+            // After filling, the start of a bucket is the end of the one before.
+            let end = fill[v] as usize;
+            let members = &bucket[first..end];
+            first = end;
+            for (i, a) in members.iter().enumerate() {
+                let mut matched = false;
+                for b in members[i + 1..].iter().filter(|b| b.high == a.high) {
+                    if a.up == b.up || matched || twin[a.half_edge.index()].is_some() {
+                        let (v, high) = (VertexId::new(v), a.high);
+                        let (from, to) = if a.up { (v, high) } else { (high, v) };
                         return Err(ConnectivityError::NonManifoldEdge {
-                            from: a.0,
-                            to: b.0,
-                            first: h.face().0,
-                            second: g.face().0,
+                            from: from.0,
+                            to: to.0,
+                            first: a.half_edge.face().0,
+                            second: b.half_edge.face().0,
                         });
                     }
-                    if opposite {
-                        twin[h.index()] = g;
-                        twin[g.index()] = h;
-                    }
+                    matched = true;
+                    twin[a.half_edge.index()] = b.half_edge;
+                    twin[b.half_edge.index()] = a.half_edge;
                 }
             }
         }
+        drop((bucket, fill));
         let border_count = twin.iter().filter(|t| !t.is_some()).count();
         let edge_count = (half_edges - border_count) / 2 + border_count;
 
@@ -141,11 +162,12 @@ impl Connectivity {
             }
         }
         let connectivity = Self { twin, outgoing, origin, edge_count, border_count };
-        for v in 0..vertex_count {
-            let reached = connectivity.outgoing(VertexId::new(v)).count();
-            if reached != degree[v] as usize {
-                return Err(ConnectivityError::NonManifoldVertex { vertex: v as u32 });
-            }
+        let torn = (0..vertex_count)
+            .into_par_iter()
+            .with_min_len(GRAIN)
+            .find_first(|&v| connectivity.outgoing(VertexId::new(v)).count() != degree[v] as usize);
+        if let Some(v) = torn {
+            return Err(ConnectivityError::NonManifoldVertex { vertex: v as u32 });
         }
         Ok(connectivity)
     }
@@ -215,20 +237,32 @@ impl Connectivity {
     /// The vertices next to each vertex, as offsets and a flat list (compressed rows). Around an interior vertex
     /// they are in counter-clockwise order.
     pub fn vertex_neighbors(&self) -> (Vec<u32>, Vec<VertexId>) {
+        let chunks: Vec<(Vec<u32>, Vec<VertexId>)> = (0..self.outgoing.len().div_ceil(GRAIN))
+            .into_par_iter()
+            .map(|chunk| {
+                let (mut ends, mut list) = (Vec::with_capacity(GRAIN), Vec::with_capacity(7 * GRAIN));
+                for v in chunk * GRAIN..((chunk + 1) * GRAIN).min(self.outgoing.len()) {
+                    let mut last = HalfEdgeId::NONE;
+                    for h in self.outgoing(VertexId::new(v)) {
+                        list.push(self.target(h));
+                        last = h;
+                    }
+                    // An open fan has one more neighbour than faces.
+                    if last.is_some() && !self.twin(last.prev()).is_some() {
+                        list.push(self.origin(last.prev()));
+                    }
+                    ends.push(list.len() as u32);
+                }
+                (ends, list)
+            })
+            .collect();
         let mut start = Vec::with_capacity(self.outgoing.len() + 1);
-        let mut list = Vec::with_capacity(self.edge_count * 2);
+        let mut list = Vec::with_capacity(chunks.iter().map(|c| c.1.len()).sum());
         start.push(0);
-        for v in 0..self.outgoing.len() {
-            let mut last = HalfEdgeId::NONE;
-            for h in self.outgoing(VertexId::new(v)) {
-                list.push(self.target(h));
-                last = h;
-            }
-            // An open fan has one more neighbour than faces.
-            if last.is_some() && !self.twin(last.prev()).is_some() {
-                list.push(self.origin(last.prev()));
-            }
-            start.push(list.len() as u32);
+        for (ends, part) in chunks {
+            let before = list.len() as u32;
+            start.extend(ends.into_iter().map(|end| before + end));
+            list.extend(part);
         }
         (start, list)
     }

@@ -161,7 +161,8 @@ pub struct SmoothingRecord {
     pub cumulative_change: f64,
     /// Per iteration: RMS step over the mean edge length (dimensionless).
     pub rms_steps: Vec<f64>,
-    /// Per iteration: signed volume after it, mm^3.
+    /// Signed volume after each iteration, mm^3, where it was computed: in each one where the volume is kept, else after the
+    /// last one only.
     pub volumes: Vec<f64>,
 }
 

@@ -67,10 +67,10 @@ impl Finish<'_> {
     pub(crate) fn mend(
         &self,
         current: &mut Vec<DVec3>,
-        keeper: &mut VolumeKeeper,
         progress: &Progress,
     ) -> Result<Mended, SmoothingError> {
         let mut mended = Mended::default();
+        let keeper = &mut None;
         if self.spikes {
             self.blunt(current, keeper, &mut mended, progress)?;
         }
@@ -84,10 +84,11 @@ impl Finish<'_> {
         !self.domain.row(v).is_empty()
     }
 
-    fn restore(&self, current: &mut [DVec3], keeper: &mut VolumeKeeper) {
+    fn restore(&self, current: &mut [DVec3], keeper: &mut Option<VolumeKeeper>) {
         // Where no offset reaches the volume, the last one that did is kept: the loop before has reported it.
         if self.keep_volume {
-            let _ = keeper.restore(self.domain, current, self.edge);
+            let keeper = keeper.get_or_insert_with(|| VolumeKeeper::new(self.mesh, self.domain));
+            let _ = keeper.settle(self.domain, current, self.edge);
         }
     }
 
@@ -121,7 +122,7 @@ impl Finish<'_> {
     fn blunt(
         &self,
         current: &mut Vec<DVec3>,
-        keeper: &mut VolumeKeeper,
+        keeper: &mut Option<VolumeKeeper>,
         mended: &mut Mended,
         progress: &Progress,
     ) -> Result<(), SmoothingError> {
@@ -188,7 +189,7 @@ impl Finish<'_> {
     fn part_crossings(
         &self,
         current: &mut [DVec3],
-        keeper: &mut VolumeKeeper,
+        keeper: &mut Option<VolumeKeeper>,
         mended: &mut Mended,
         progress: &Progress,
     ) -> Result<(), SmoothingError> {

@@ -4,6 +4,7 @@
 //! of a fixed size and then added in order.
 
 use rayon::prelude::*;
+use std::ops::Range;
 use topipe_mesh::{DVec3, RegionShape};
 
 /// Vertices per task: positions of one chunk (96 KiB) fit the second-level cache.
@@ -37,7 +38,7 @@ impl Domain {
         self.start.windows(2).filter(|w| w[0] < w[1]).count()
     }
 
-    /// Sets `target[v] = f(v, row)` for vertices with a row and `target[v] = fixed(v)` for the others.
+    /// Sets `target[v] = f(v, row, start of the row)` for vertices with a row and `target[v] = fixed(v)` for the others.
     #[inline]
     pub(crate) fn sweep(
         &self,
@@ -58,6 +59,31 @@ impl Domain {
                 begin = end;
             }
         });
+    }
+
+    /// The last sweep of a step: sets `next[v] = f(v, row, start of the row)`, leaves vertices without a row where they are,
+    /// and measures the step on the way.
+    #[inline]
+    pub(crate) fn advance(
+        &self,
+        current: &[DVec3],
+        next: &mut [DVec3],
+        f: impl Fn(usize, &[u32], usize) -> DVec3 + Sync,
+    ) -> Change {
+        let chunks = next.par_chunks_mut(CHUNK).enumerate().map(|(k, chunk)| {
+            let base = k * CHUNK;
+            let mut begin = self.start[base] as usize;
+            let mut change = Change::default();
+            for (i, slot) in chunk.iter_mut().enumerate() {
+                let (v, end) = (base + i, self.start[base + i + 1] as usize);
+                let here = current[v];
+                *slot = if begin == end { here } else { f(v, &self.neighbors[begin..end], begin) };
+                change.add(here, *slot);
+                begin = end;
+            }
+            change
+        });
+        Change::sum(&chunks.collect::<Vec<_>>())
     }
 
     /// Takes back what a step moved the sliding vertices off their shapes.
@@ -91,7 +117,8 @@ pub(crate) fn mean(values: &[DVec3], row: &[u32]) -> DVec3 {
     for &j in row {
         sum += values[j as usize];
     }
-    sum / row.len() as f64
+    // One division for three coordinates.
+    sum * (row.len() as f64).recip()
 }
 
 /// The weighted mean of the neighbours less the vertex; the weights of a row add up to 1.
@@ -115,16 +142,7 @@ pub(crate) fn weighted_umbrella(positions: &[DVec3], vertex: usize, row: &[u32],
 /// the smallest angle of a triangle after smoothing was 1 degree with a floor of 0, and 8 degrees with 0.5.
 pub(crate) fn scale_dependent(domain: &Domain, positions: &[DVec3], floor: f64, weights: &mut Vec<f64>) {
     weights.resize(domain.neighbors.len(), 0.0);
-    // Rows differ in length, so chunks of vertices are cut out of the flat array by hand.
-    let mut tasks = Vec::with_capacity(positions.len() / CHUNK + 1);
-    let mut rest = weights.as_mut_slice();
-    for base in (0..positions.len()).step_by(CHUNK) {
-        let end = (base + CHUNK).min(positions.len());
-        let (task, tail) = rest.split_at_mut((domain.start[end] - domain.start[base]) as usize);
-        tasks.push((base..end, task));
-        rest = tail;
-    }
-    tasks.into_par_iter().for_each(|(vertices, task)| {
+    cut_rows(&domain.start, weights).into_par_iter().for_each(|(vertices, task)| {
         let first = domain.start[vertices.start] as usize;
         for v in vertices {
             let row = domain.row(v);
@@ -156,7 +174,22 @@ pub(crate) fn scale_dependent(domain: &Domain, positions: &[DVec3], floor: f64, 
     });
 }
 
+/// Cuts a flat array of rows into chunks of vertices, one task each: rows differ in length, so `par_chunks` can not.
+pub(crate) fn cut_rows<'a, T>(start: &[u32], rows: &'a mut [T]) -> Vec<(Range<usize>, &'a mut [T])> {
+    let vertices = start.len() - 1;
+    let mut tasks = Vec::with_capacity(vertices / CHUNK + 1);
+    let mut rest = rows;
+    for base in (0..vertices).step_by(CHUNK) {
+        let end = (base + CHUNK).min(vertices);
+        let (task, tail) = rest.split_at_mut((start[end] - start[base]) as usize);
+        tasks.push((base..end, task));
+        rest = tail;
+    }
+    tasks
+}
+
 /// How far two states of the mesh are apart.
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Change {
     /// Sum of the squared distances.
     pub(crate) squares: f64,
@@ -164,18 +197,29 @@ pub(crate) struct Change {
     pub(crate) distances: f64,
 }
 
-/// Sums distances between `a` and `b`, in fixed order.
-pub(crate) fn change(a: &[DVec3], b: &[DVec3]) -> Change {
-    let partial: Vec<(f64, f64)> = a
-        .par_chunks(CHUNK)
-        .zip(b.par_chunks(CHUNK))
-        .map(|(a, b)| {
-            a.iter().zip(b).fold((0.0, 0.0), |(squares, distances), (p, q)| {
-                let square = p.distance_squared(*q);
-                (squares + square, distances + square.sqrt())
-            })
+impl Change {
+    #[inline]
+    pub(crate) fn add(&mut self, from: DVec3, to: DVec3) {
+        let square = from.distance_squared(to);
+        self.squares += square;
+        self.distances += square.sqrt();
+    }
+
+    /// The sum over chunks, in order.
+    pub(crate) fn sum(chunks: &[Self]) -> Self {
+        chunks.iter().fold(Self::default(), |sum, c| Self {
+            squares: sum.squares + c.squares,
+            distances: sum.distances + c.distances,
         })
-        .collect();
-    let (squares, distances) = partial.iter().fold((0.0, 0.0), |(s, d), p| (s + p.0, d + p.1));
-    Change { squares, distances }
+    }
+
+    /// Between `a` and `b`, in fixed order.
+    pub(crate) fn between(a: &[DVec3], b: &[DVec3]) -> Self {
+        let chunks = a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(|(a, b)| {
+            let mut change = Self::default();
+            a.iter().zip(b).for_each(|(p, q)| change.add(*p, *q));
+            change
+        });
+        Self::sum(&chunks.collect::<Vec<_>>())
+    }
 }

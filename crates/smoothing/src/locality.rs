@@ -4,7 +4,7 @@
 //! after a subdivision, these reads go all over the memory; along a Morton curve they stay within a cache. The
 //! measured gain stands in `benches/README.md`. Small meshes fit the cache as they are.
 
-use crate::kernel::{Domain, Slide};
+use crate::kernel::{Domain, Slide, cut_rows};
 use rayon::prelude::*;
 use topipe_mesh::{DVec3, TriangleMesh, VertexId};
 
@@ -63,21 +63,41 @@ impl Order {
 
     /// The mesh in the new numbering, its triangles in the order of their first vertices.
     pub(crate) fn mesh(&self, mesh: &TriangleMesh) -> TriangleMesh {
-        let mut triangles: Vec<[VertexId; 3]> =
-            mesh.triangles.par_iter().map(|t| t.map(|v| VertexId(self.new[v.index()]))).collect();
-        triangles.par_sort_unstable_by_key(|t| (t.iter().min().copied(), *t));
+        let renumbered = |t: &[VertexId; 3]| t.map(|v| VertexId(self.new[v.index()]));
+        let first = |t: &[VertexId; 3]| t[0].min(t[1]).min(t[2]).index();
+        // A counting sort: linear, and triangles with the same first vertex keep their order.
+        let mut place = vec![0u32; self.old.len() + 1];
+        mesh.triangles.iter().for_each(|t| place[first(&renumbered(t)) + 1] += 1);
+        for v in 1..place.len() {
+            place[v] += place[v - 1];
+        }
+        let mut triangles = vec![[VertexId::NONE; 3]; mesh.face_count()];
+        for t in mesh.triangles.iter().map(renumbered) {
+            let slot = &mut place[first(&t)];
+            triangles[*slot as usize] = t;
+            *slot += 1;
+        }
         TriangleMesh { positions: self.apply(&mesh.positions), triangles }
     }
 
     /// The domain in the new numbering; rows keep their order.
     pub(crate) fn domain(&self, domain: &Domain) -> Domain {
         let mut start = Vec::with_capacity(domain.start.len());
-        let mut neighbors = Vec::with_capacity(domain.neighbors.len());
         start.push(0);
-        for &o in &self.old {
-            neighbors.extend(domain.row(o as usize).iter().map(|&j| self.new[j as usize]));
-            start.push(neighbors.len() as u32);
-        }
+        let mut end = 0;
+        start.extend(self.old.iter().map(|&o| {
+            end += domain.start[o as usize + 1] - domain.start[o as usize];
+            end
+        }));
+        let mut neighbors = vec![0; domain.neighbors.len()];
+        cut_rows(&start, &mut neighbors).into_par_iter().for_each(|(vertices, mut rows)| {
+            for &o in &self.old[vertices] {
+                let row = domain.row(o as usize);
+                let (this, rest) = rows.split_at_mut(row.len());
+                this.iter_mut().zip(row).for_each(|(to, from)| *to = self.new[*from as usize]);
+                rows = rest;
+            }
+        });
         let mut slides: Vec<Slide> = domain
             .slides
             .iter()

@@ -3,11 +3,11 @@
 use crate::alpha;
 use crate::features::{self, Features};
 use crate::finish::{Finish, Mended};
-use crate::kernel::{Domain, Slide, change};
+use crate::kernel::{Change, Domain, Slide};
 use crate::locality::Order;
 use crate::methods;
 use crate::outline::OutlineGuard;
-use crate::volume::VolumeKeeper;
+use crate::volume::{VolumeKeeper, six_volumes};
 use crate::{Method, Parameters, SmoothingError};
 use topipe_mesh::{Connectivity, DVec3, Design, FeatureKind, Part, RegionId, SmoothingRecord, TriangleMesh};
 use topipe_progress::Progress;
@@ -53,44 +53,51 @@ pub(crate) fn smooth_observed(
         ));
     }
     let mut features = features::detect(part, &connectivity, parameters, progress)?;
-    let mut result = part.clone();
     let mut record =
         SmoothingRecord { method: parameters.method.name().to_owned(), ..SmoothingRecord::default() };
     let frozen = frozen(part, parameters, &features);
-    if parameters.most_iterations() == 0 {
+    let positions = if parameters.most_iterations() == 0 {
         record.converged = true;
+        mesh.positions.clone()
     } else {
         let domain = domain(&connectivity, &features, &frozen, mesh.vertex_count());
-        result.mesh.positions = iterate(
+        iterate(
             &Setup { part, connectivity: &connectivity, features: &features, domain: &domain },
             parameters,
             progress,
             &mut record,
             observe,
-        )?;
-    }
+        )?
+    };
+    let smoothed = TriangleMesh { positions, triangles: mesh.triangles.clone() };
     let solid: Vec<bool> = mesh.triangles.iter().map(|t| t.iter().all(|v| frozen[v.index()])).collect();
-    features.measure(&result.mesh);
-    result.feature_edges =
+    features.measure(&smoothed);
+    let mut feature_edges: Vec<_> =
         part.feature_edges.iter().filter(|e| e.kind == FeatureKind::User).copied().collect();
     // Between faces of which nothing is known no edge is a feature.
     let known = !features.regions.is_empty() || solid.contains(&true);
     let edges = if known {
-        features::feature_edges(&result.mesh, &connectivity, &features, &solid, parameters)
+        features::feature_edges(&smoothed, &connectivity, &features, &solid, parameters)
     } else {
         Vec::new()
     };
     for edge in edges {
         if !part.feature_edges.iter().any(|e| e.kind == FeatureKind::User && e.vertices == edge.vertices) {
-            result.feature_edges.push(edge);
+            feature_edges.push(edge);
         }
     }
-    result.feature_edges.sort_unstable_by_key(|e| e.vertices);
-    result.regions = features.regions;
-    result.region_of_face = features.region_of_face;
-    result.frozen = frozen;
-    result.smoothing = Some(record);
-    Ok(result)
+    feature_edges.sort_unstable_by_key(|e| e.vertices);
+    Ok(Part {
+        mesh: smoothed,
+        design: part.design.clone(),
+        regions: features.regions,
+        region_of_face: features.region_of_face,
+        feature_edges,
+        frozen,
+        provenance: part.provenance.clone(),
+        import: part.import.clone(),
+        smoothing: Some(record),
+    })
 }
 
 fn check_attributes(part: &Part) -> Result<(), SmoothingError> {
@@ -137,6 +144,10 @@ fn frozen(part: &Part, parameters: &Parameters, features: &Features) -> Vec<bool
 
 fn domain(connectivity: &Connectivity, features: &Features, frozen: &[bool], vertices: usize) -> Domain {
     let (all_start, all) = connectivity.vertex_neighbors();
+    if features.sliding.is_empty() && !frozen.contains(&true) {
+        let neighbors = all.into_iter().map(|n| n.0).collect();
+        return Domain { start: all_start, neighbors, slides: Vec::new() };
+    }
     let mut start = Vec::with_capacity(vertices + 1);
     let mut neighbors = Vec::with_capacity(all.len());
     let mut slides = Vec::new();
@@ -213,35 +224,31 @@ fn iterate(
         return Err(SmoothingError::EverythingFrozen { vertices: mesh.vertex_count(), non_design });
     }
     let edge = mesh.mean_edge_length();
-    let mut keeper = VolumeKeeper::new(mesh, domain);
     if parameters.keeps_volume() {
         if !connectivity.is_closed() {
             return Err(SmoothingError::Open { edges: connectivity.border_edge_count() });
         }
-        if keeper.wanted().abs() <= 1e-9 * edge * mesh.area() {
-            return Err(SmoothingError::ZeroVolume { volume: keeper.wanted() });
+        let volume = mesh.volume();
+        if volume.abs() <= 1e-9 * edge * mesh.area() {
+            return Err(SmoothingError::ZeroVolume { volume });
         }
     }
     let parameters = &settle_alpha(parameters, domain, original, edge, progress);
     let guard = OutlineGuard::new(mesh, features, domain);
     let order = Order::along_curve(mesh);
     let mut current = match &order {
-        None => run(
-            &Run { mesh, domain, guard: &guard, edge, free, order: None },
-            &mut keeper,
-            parameters,
-            progress,
-            record,
-            observe,
-        )?,
+        None => {
+            let setup = Run { mesh, domain, guard: &guard, edge, free, order: None };
+            run(&setup, parameters, progress, record, observe)?
+        }
         Some(order) => {
             let (mesh, domain) = (order.mesh(mesh), order.domain(domain));
             let guard = guard.renumbered(|v| order.new_number(v));
-            let mut keeper = VolumeKeeper::new(&mesh, &domain);
             let setup = Run { mesh: &mesh, domain: &domain, guard: &guard, edge, free, order: Some(order) };
-            order.undo(&run(&setup, &mut keeper, parameters, progress, record, observe)?)
+            order.undo(&run(&setup, parameters, progress, record, observe)?)
         }
     };
+    drop(order);
     if parameters.method != Method::Contract {
         let finish = Finish {
             mesh,
@@ -259,7 +266,7 @@ fn iterate(
             keep_volume: parameters.keeps_volume(),
             edge,
         };
-        let mended = finish.mend(&mut current, &mut keeper, progress)?;
+        let mended = finish.mend(&mut current, progress)?;
         if mended != Mended::default() {
             progress.remark(&format!(
                 "{} edges were sharper than `spike_angle`, {} still are; {} pairs of triangles passed through each other \
@@ -268,7 +275,7 @@ fn iterate(
             ));
         }
     }
-    record.total_change = change(original, &current).distances;
+    record.total_change = Change::between(original, &current).distances;
     Ok(current)
 }
 
@@ -285,7 +292,6 @@ struct Run<'a> {
 /// The iteration itself.
 fn run(
     setup: &Run<'_>,
-    keeper: &mut VolumeKeeper,
     parameters: &Parameters,
     progress: &Progress,
     record: &mut SmoothingRecord,
@@ -293,32 +299,43 @@ fn run(
 ) -> Result<Vec<DVec3>, SmoothingError> {
     let Run { mesh, domain, guard, edge, free, order } = *setup;
     let original = &mesh.positions;
+    let mut keeper = parameters.keeps_volume().then(|| VolumeKeeper::new(mesh, domain));
+    let (low, high) = mesh.bounds();
+    let center = (low + high) / 2.0;
+    let out_of_reach = |iteration, volume, wanted| SmoothingError::VolumeOutOfReach {
+        iteration,
+        volume,
+        wanted,
+        free: free - domain.slides.len(),
+    };
     let mut step = methods::choose(parameters, domain, original);
     let mut current = original.clone();
     let mut next = original.clone();
     let most = parameters.most_iterations();
     for iteration in 1..=most {
         progress.check()?;
-        step.step(domain, original, &current, &mut next);
+        let mut change = step.step(domain, original, &current, &mut next);
         domain.project(original, &mut next);
         guard.hold(&current, &mut next);
-        let volume = if parameters.keeps_volume() {
-            keeper.restore(domain, &mut next, edge).map_err(|volume| SmoothingError::VolumeOutOfReach {
-                iteration,
-                volume,
-                wanted: keeper.wanted(),
-                free: free - domain.slides.len(),
-            })?
-        } else {
-            keeper.volume(&next)
+        let volume = match &mut keeper {
+            Some(keeper) => {
+                let wanted = keeper.wanted();
+                keeper.restore(domain, &mut next, edge).map_err(|v| out_of_reach(iteration, v, wanted))?
+            }
+            None if observe.is_some() => six_volumes(&mesh.triangles, center, &next) / 6.0,
+            None => f64::NAN,
         };
-        let change = change(&current, &next);
+        if keeper.is_some() || !domain.slides.is_empty() {
+            change = Change::between(&current, &next);
+        }
         let rms = (change.squares / free as f64).sqrt() / edge;
         std::mem::swap(&mut current, &mut next);
         record.iterations = iteration;
         record.cumulative_change += change.distances;
         record.rms_steps.push(rms);
-        record.volumes.push(volume);
+        if volume.is_finite() {
+            record.volumes.push(volume);
+        }
         progress.step(iteration.into(), most.into(), "iterations");
         if !rms.is_finite() || rms > DIVERGED {
             return Err(SmoothingError::Diverged { iteration, step: rms });
@@ -331,6 +348,19 @@ fn run(
             record.converged = true;
             break;
         }
+    }
+    match &mut keeper {
+        Some(keeper) => {
+            let (iteration, wanted) = (record.iterations, keeper.wanted());
+            let volume =
+                keeper.settle(domain, &mut current, edge).map_err(|v| out_of_reach(iteration, v, wanted))?;
+            record.volumes.pop();
+            record.volumes.push(volume);
+        }
+        None if record.volumes.is_empty() => {
+            record.volumes.push(six_volumes(&mesh.triangles, center, &current) / 6.0);
+        }
+        None => {}
     }
     Ok(current)
 }

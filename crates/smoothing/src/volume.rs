@@ -11,7 +11,10 @@ use topipe_mesh::{DVec3, TriangleMesh, VertexId};
 
 /// Knows the volume to restore and how to do it.
 pub(crate) struct VolumeKeeper {
-    triangles: Vec<[VertexId; 3]>,
+    /// Triangles with a vertex that may move.
+    moving: Vec<[VertexId; 3]>,
+    /// Six times what the others add to the volume.
+    still: f64,
     /// Volumes are summed about this point, so that a part far from the origin keeps its digits.
     center: DVec3,
     wanted: f64,
@@ -30,6 +33,23 @@ fn slope(c: Cubic, tau: f64) -> f64 {
     (3.0 * c[3] * tau + 2.0 * c[2]) * tau + c[1]
 }
 
+/// Six times the volume between triangles and `center`, in fixed order.
+pub(crate) fn six_volumes(triangles: &[[VertexId; 3]], center: DVec3, positions: &[DVec3]) -> f64 {
+    let partial: Vec<f64> = triangles
+        .par_chunks(CHUNK)
+        .map(|chunk| {
+            chunk
+                .iter()
+                .map(|t| {
+                    let [a, b, c] = t.map(|v| positions[v.index()] - center);
+                    a.dot(b.cross(c))
+                })
+                .sum()
+        })
+        .collect();
+    partial.iter().sum()
+}
+
 impl VolumeKeeper {
     pub(crate) fn new(mesh: &TriangleMesh, domain: &Domain) -> Self {
         let (low, high) = mesh.bounds();
@@ -37,9 +57,13 @@ impl VolumeKeeper {
         for slide in &domain.slides {
             slides[slide.vertex as usize] = true;
         }
+        let center = (low + high) / 2.0;
+        let (moving, still): (Vec<_>, Vec<_>) =
+            mesh.triangles.iter().partition(|t| t.iter().any(|v| !domain.row(v.index()).is_empty()));
         let mut keeper = Self {
-            triangles: mesh.triangles.clone(),
-            center: (low + high) / 2.0,
+            still: six_volumes(&still, center, &mesh.positions),
+            moving,
+            center,
             wanted: 0.0,
             directions: vec![DVec3::ZERO; mesh.vertex_count()],
             slides,
@@ -55,25 +79,12 @@ impl VolumeKeeper {
 
     /// The volume inside the mesh with these positions.
     pub(crate) fn volume(&self, positions: &[DVec3]) -> f64 {
-        let partial: Vec<f64> = self
-            .triangles
-            .par_chunks(CHUNK)
-            .map(|chunk| {
-                chunk
-                    .iter()
-                    .map(|t| {
-                        let [a, b, c] = t.map(|v| positions[v.index()] - self.center);
-                        a.dot(b.cross(c))
-                    })
-                    .sum()
-            })
-            .collect();
-        partial.iter().sum::<f64>() / 6.0
+        (self.still + six_volumes(&self.moving, self.center, positions)) / 6.0
     }
 
     fn cubic(&self, positions: &[DVec3]) -> Cubic {
         let partial: Vec<Cubic> = self
-            .triangles
+            .moving
             .par_chunks(CHUNK)
             .map(|chunk| {
                 let mut sum = [0.0; 4];
@@ -88,7 +99,7 @@ impl VolumeKeeper {
                 sum
             })
             .collect();
-        let mut sum = [0.0; 4];
+        let mut sum = [self.still, 0.0, 0.0, 0.0];
         for p in partial {
             for k in 0..4 {
                 sum[k] += p[k];
@@ -97,8 +108,8 @@ impl VolumeKeeper {
         sum.map(|s| s / 6.0)
     }
 
-    /// Moves the free vertices along their normals until the volume is the wanted one, and returns the volume it
-    /// reached, or `Err` with the present volume where an offset by up to `reach` does not do it.
+    /// Moves the free vertices along their normals to the wanted volume, and returns the volume there up to rounding, or
+    /// `Err` with the present volume where an offset by up to `reach` does not do it.
     ///
     /// Sliding vertices have no direction: the plane they slide in stays where it is.
     pub(crate) fn restore(
@@ -107,8 +118,32 @@ impl VolumeKeeper {
         positions: &mut [DVec3],
         reach: f64,
     ) -> Result<f64, f64> {
+        self.aim(domain, positions);
+        self.offset(positions, reach)
+    }
+
+    /// As [`Self::restore`], then measures the volume and takes out what rounding left. Returns the measured volume.
+    pub(crate) fn settle(
+        &mut self,
+        domain: &Domain,
+        positions: &mut [DVec3],
+        reach: f64,
+    ) -> Result<f64, f64> {
+        self.aim(domain, positions);
+        let mut volume = self.volume(positions);
+        for _ in 0..2 {
+            if (volume - self.wanted).abs() <= 1e-14 * self.wanted.abs() {
+                break;
+            }
+            self.offset(positions, reach)?;
+            volume = self.volume(positions);
+        }
+        Ok(volume)
+    }
+
+    /// Sets the directions.
+    fn aim(&mut self, domain: &Domain, positions: &[DVec3]) {
         let slides = &self.slides;
-        let here: &[DVec3] = positions;
         domain.sweep(
             &mut self.directions,
             |_| DVec3::ZERO,
@@ -117,43 +152,40 @@ impl VolumeKeeper {
                     return DVec3::ZERO;
                 }
                 // The row of a free vertex is its whole ring, counter-clockwise.
-                let p = here[v];
+                let p = positions[v];
                 let mut normal = DVec3::ZERO;
-                let mut from = here[row[row.len() - 1] as usize] - p;
+                let mut from = positions[row[row.len() - 1] as usize] - p;
                 for &j in row {
-                    let to = here[j as usize] - p;
+                    let to = positions[j as usize] - p;
                     normal += from.cross(to);
                     from = to;
                 }
                 normal.normalize_or_zero()
             },
         );
-        // One round solves it up to the rounding of the positions; the second removes what that left.
-        let mut cubic = self.cubic(positions);
-        for _ in 0..2 {
-            let mut tau = 0.0;
-            for _ in 0..32 {
-                let step = (self.wanted - value(cubic, tau)) / slope(cubic, tau);
-                if !step.is_finite() {
-                    return Err(cubic[0]);
-                }
-                tau += step;
-                if tau.abs() > reach {
-                    return Err(cubic[0]);
-                }
-                if step.abs() <= 1e-16 * reach {
-                    break;
-                }
+    }
+
+    /// One round along the directions: solves the cubic and moves.
+    fn offset(&self, positions: &mut [DVec3], reach: f64) -> Result<f64, f64> {
+        let cubic = self.cubic(positions);
+        let mut tau = 0.0;
+        for _ in 0..32 {
+            let step = (self.wanted - value(cubic, tau)) / slope(cubic, tau);
+            if !step.is_finite() {
+                return Err(cubic[0]);
             }
-            positions
-                .par_chunks_mut(CHUNK)
-                .zip(self.directions.par_chunks(CHUNK))
-                .for_each(|(p, d)| p.iter_mut().zip(d).for_each(|(p, d)| *p += tau * *d));
-            cubic = self.cubic(positions);
-            if (cubic[0] - self.wanted).abs() <= 1e-14 * self.wanted.abs() {
+            tau += step;
+            if tau.abs() > reach {
+                return Err(cubic[0]);
+            }
+            if step.abs() <= 1e-16 * reach {
                 break;
             }
         }
-        Ok(cubic[0])
+        positions
+            .par_chunks_mut(CHUNK)
+            .zip(self.directions.par_chunks(CHUNK))
+            .for_each(|(p, d)| p.iter_mut().zip(d).for_each(|(p, d)| *p += tau * *d));
+        Ok(value(cubic, tau))
     }
 }

@@ -12,7 +12,7 @@
 //! 7 as printed loses 71 %; the pseudo-code loses 0.5 %, which the volume correction restores.
 
 use super::Step;
-use crate::kernel::{Domain, mean, scale_dependent, weighted_umbrella};
+use crate::kernel::{Change, Domain, mean, scale_dependent, weighted_umbrella};
 use crate::{Parameters, Weights};
 use topipe_mesh::DVec3;
 
@@ -43,7 +43,7 @@ impl HcSdu {
 }
 
 impl Step for HcSdu {
-    fn step(&mut self, domain: &Domain, original: &[DVec3], current: &[DVec3], next: &mut [DVec3]) {
+    fn step(&mut self, domain: &Domain, original: &[DVec3], current: &[DVec3], next: &mut [DVec3]) -> Change {
         if self.updated {
             scale_dependent(domain, current, self.floor, &mut self.weights);
         }
@@ -59,13 +59,9 @@ impl Step for HcSdu {
         );
         let difference = &self.difference;
         // s is not stored: s = c + diff - alpha/2 (c - o).
-        domain.sweep(
-            next,
-            |v| current[v],
-            |v, row, _| {
-                current[v] - half_alpha * (current[v] - original[v])
-                    + (1.0 - beta) * (difference[v] - mean(difference, row))
-            },
-        );
+        domain.advance(current, next, |v, row, _| {
+            current[v] - half_alpha * (current[v] - original[v])
+                + (1.0 - beta) * (difference[v] - mean(difference, row))
+        })
     }
 }

@@ -8,7 +8,7 @@
 //! mesh is less centred than one from the part itself (0.0215 against 0.0120 in that thesis).
 
 use super::Step;
-use crate::kernel::{Domain, umbrella};
+use crate::kernel::{Change, Domain, umbrella};
 use topipe_mesh::DVec3;
 
 pub(super) struct Laplacian {
@@ -16,8 +16,8 @@ pub(super) struct Laplacian {
 }
 
 impl Step for Laplacian {
-    fn step(&mut self, domain: &Domain, _: &[DVec3], current: &[DVec3], next: &mut [DVec3]) {
+    fn step(&mut self, domain: &Domain, _: &[DVec3], current: &[DVec3], next: &mut [DVec3]) -> Change {
         let lambda = self.lambda;
-        domain.sweep(next, |v| current[v], |v, row, _| current[v] + lambda * umbrella(current, v, row));
+        domain.advance(current, next, |v, row, _| current[v] + lambda * umbrella(current, v, row))
     }
 }

@@ -6,7 +6,7 @@ mod laplacian;
 mod sdu;
 mod taubin;
 
-use crate::kernel::Domain;
+use crate::kernel::{Change, Domain};
 use crate::{Method, Parameters};
 use topipe_mesh::DVec3;
 
@@ -15,8 +15,8 @@ const UNSET_ALPHA: f64 = 0.1;
 
 /// One iteration of a method. It leaves vertices with empty rows where they are, bit by bit.
 pub(crate) trait Step {
-    /// Computes `next` from `current` and from the mesh before the first iteration.
-    fn step(&mut self, domain: &Domain, original: &[DVec3], current: &[DVec3], next: &mut [DVec3]);
+    /// Computes `next` from `current` and from the mesh before the first iteration, and how far they are apart.
+    fn step(&mut self, domain: &Domain, original: &[DVec3], current: &[DVec3], next: &mut [DVec3]) -> Change;
 }
 
 /// The method that `parameters` name, ready for a mesh with these positions.

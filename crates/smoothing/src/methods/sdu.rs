@@ -4,7 +4,7 @@
 //! A vertex is drawn less by far neighbours than by near ones, so triangles keep their sizes better.
 
 use super::Step;
-use crate::kernel::{Domain, scale_dependent, weighted_umbrella};
+use crate::kernel::{Change, Domain, scale_dependent, weighted_umbrella};
 use crate::{Parameters, Weights};
 use topipe_mesh::DVec3;
 
@@ -29,17 +29,13 @@ impl Sdu {
 }
 
 impl Step for Sdu {
-    fn step(&mut self, domain: &Domain, _: &[DVec3], current: &[DVec3], next: &mut [DVec3]) {
+    fn step(&mut self, domain: &Domain, _: &[DVec3], current: &[DVec3], next: &mut [DVec3]) -> Change {
         if self.updated {
             scale_dependent(domain, current, self.floor, &mut self.weights);
         }
         let (lambda, weights) = (self.lambda, &self.weights);
-        domain.sweep(
-            next,
-            |v| current[v],
-            |v, row, first| {
-                current[v] + lambda * weighted_umbrella(current, v, row, &weights[first..first + row.len()])
-            },
-        );
+        domain.advance(current, next, |v, row, first| {
+            current[v] + lambda * weighted_umbrella(current, v, row, &weights[first..first + row.len()])
+        })
     }
 }

@@ -7,7 +7,7 @@
 
 use super::Step;
 use crate::Parameters;
-use crate::kernel::{Domain, umbrella};
+use crate::kernel::{Change, Domain, umbrella};
 use topipe_mesh::DVec3;
 
 pub(super) struct Taubin {
@@ -23,7 +23,7 @@ impl Taubin {
 }
 
 impl Step for Taubin {
-    fn step(&mut self, domain: &Domain, _: &[DVec3], current: &[DVec3], next: &mut [DVec3]) {
+    fn step(&mut self, domain: &Domain, _: &[DVec3], current: &[DVec3], next: &mut [DVec3]) -> Change {
         let (lambda, mu) = (self.lambda, self.mu);
         domain.sweep(
             &mut self.shrunk,
@@ -31,6 +31,6 @@ impl Step for Taubin {
             |v, row, _| current[v] + lambda * umbrella(current, v, row),
         );
         let shrunk = &self.shrunk;
-        domain.sweep(next, |v| shrunk[v], |v, row, _| shrunk[v] + mu * umbrella(shrunk, v, row));
+        domain.advance(current, next, |v, row, _| shrunk[v] + mu * umbrella(shrunk, v, row))
     }
 }
