@@ -49,16 +49,6 @@ impl OutlineGuard {
         Self { faces, slides }
     }
 
-    /// The same for another numbering of the vertices.
-    pub(crate) fn renumbered(&self, new_number: impl Fn(usize) -> usize) -> Self {
-        let faces = self.faces.iter().map(|f| Guarded { vertices: f.vertices.map(&new_number), ..*f });
-        let mut slides = vec![false; self.slides.len()];
-        for (v, _) in self.slides.iter().enumerate().filter(|(_, slides)| **slides) {
-            slides[new_number(v)] = true;
-        }
-        Self { faces: faces.collect(), slides }
-    }
-
     /// Takes the step of sliding vertices back where it would shrink a triangle too far. `current` has no such
     /// triangle, so this ends at the latest when all of them are back.
     pub(crate) fn hold(&self, current: &[DVec3], next: &mut [DVec3]) {

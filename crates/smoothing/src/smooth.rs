@@ -43,6 +43,42 @@ pub(crate) fn smooth_observed(
     if let Some(v) = mesh.positions.iter().position(|p| !p.is_finite()) {
         return Err(SmoothingError::NotFinite { vertex: v as u32 });
     }
+    let order = match mesh.triangles.iter().flatten().any(|v| v.index() >= mesh.vertex_count()) {
+        true => None,
+        false => Order::along_curve(mesh),
+    };
+    match order {
+        None => smooth_as_numbered(part, parameters, progress, observe),
+        Some(order) => {
+            let inner = order.apply(part);
+            let smoothed = match observe {
+                None => smooth_as_numbered(&inner, parameters, progress, None),
+                Some(observe) => {
+                    let mut observe = |before: &[DVec3], after: &[DVec3], volume: f64| {
+                        observe(&order.undo(before), &order.undo(after), volume)
+                    };
+                    smooth_as_numbered(&inner, parameters, progress, Some(&mut observe))
+                }
+            };
+            match smoothed {
+                // Named by the numbers of the caller.
+                Err(SmoothingError::Connectivity(inner)) => {
+                    Err(Connectivity::build(mesh).err().unwrap_or(inner).into())
+                }
+                smoothed => Ok(order.restore(part, smoothed?)),
+            }
+        }
+    }
+}
+
+/// Smooths a part that has been checked, in its own numbering.
+fn smooth_as_numbered(
+    part: &Part,
+    parameters: &Parameters,
+    progress: &Progress,
+    observe: Option<&mut Observer<'_>>,
+) -> Result<Part, SmoothingError> {
+    let mesh = &part.mesh;
     let connectivity = Connectivity::build(mesh)?;
     if parameters.method == Method::Taubin && !parameters.obeys_taubin_rule() {
         progress.remark(&format!(
@@ -235,20 +271,8 @@ fn iterate(
     }
     let parameters = &settle_alpha(parameters, domain, original, edge, progress);
     let guard = OutlineGuard::new(mesh, features, domain);
-    let order = Order::along_curve(mesh);
-    let mut current = match &order {
-        None => {
-            let setup = Run { mesh, domain, guard: &guard, edge, free, order: None };
-            run(&setup, parameters, progress, record, observe)?
-        }
-        Some(order) => {
-            let (mesh, domain) = (order.mesh(mesh), order.domain(domain));
-            let guard = guard.renumbered(|v| order.new_number(v));
-            let setup = Run { mesh: &mesh, domain: &domain, guard: &guard, edge, free, order: Some(order) };
-            order.undo(&run(&setup, parameters, progress, record, observe)?)
-        }
-    };
-    drop(order);
+    let setup = Run { mesh, domain, guard: &guard, edge, free };
+    let mut current = run(&setup, parameters, progress, record, observe)?;
     if parameters.method != Method::Contract {
         let finish = Finish {
             mesh,
@@ -279,14 +303,13 @@ fn iterate(
     Ok(current)
 }
 
-/// What the iteration works on, in its own numbering.
+/// What the iteration works on.
 struct Run<'a> {
     mesh: &'a TriangleMesh,
     domain: &'a Domain,
     guard: &'a OutlineGuard,
     edge: f64,
     free: usize,
-    order: Option<&'a Order>,
 }
 
 /// The iteration itself.
@@ -297,7 +320,7 @@ fn run(
     record: &mut SmoothingRecord,
     mut observe: Option<&mut Observer<'_>>,
 ) -> Result<Vec<DVec3>, SmoothingError> {
-    let Run { mesh, domain, guard, edge, free, order } = *setup;
+    let Run { mesh, domain, guard, edge, free } = *setup;
     let original = &mesh.positions;
     let mut keeper = parameters.keeps_volume().then(|| VolumeKeeper::new(mesh, domain));
     let (low, high) = mesh.bounds();
@@ -340,10 +363,7 @@ fn run(
         if !rms.is_finite() || rms > DIVERGED {
             return Err(SmoothingError::Diverged { iteration, step: rms });
         }
-        let stop = observe.as_mut().is_some_and(|observe| match order {
-            None => observe(&next, &current, volume),
-            Some(order) => observe(&order.undo(&next), &order.undo(&current), volume),
-        });
+        let stop = observe.as_mut().is_some_and(|observe| observe(&next, &current, volume));
         if stop || rms < parameters.tolerance {
             record.converged = true;
             break;

@@ -5,8 +5,7 @@
 //! about the origin instead (its equations 4 and 5), which is exact only when nothing is frozen and depends on where
 //! the part lies.
 
-use crate::kernel::{CHUNK, Domain};
-use rayon::prelude::*;
+use crate::kernel::{Domain, in_chunks, in_chunks_mut};
 use topipe_mesh::{DVec3, TriangleMesh, VertexId};
 
 /// Knows the volume to restore and how to do it.
@@ -35,19 +34,14 @@ fn slope(c: Cubic, tau: f64) -> f64 {
 
 /// Six times the volume between triangles and `center`, in fixed order.
 pub(crate) fn six_volumes(triangles: &[[VertexId; 3]], center: DVec3, positions: &[DVec3]) -> f64 {
-    let partial: Vec<f64> = triangles
-        .par_chunks(CHUNK)
-        .map(|chunk| {
-            chunk
-                .iter()
-                .map(|t| {
-                    let [a, b, c] = t.map(|v| positions[v.index()] - center);
-                    a.dot(b.cross(c))
-                })
-                .sum()
-        })
-        .collect();
-    partial.iter().sum()
+    let chunks = in_chunks(triangles, |_, chunk| -> f64 {
+        let six = |t: &[VertexId; 3]| {
+            let [a, b, c] = t.map(|v| positions[v.index()] - center);
+            a.dot(b.cross(c))
+        };
+        chunk.iter().map(six).sum()
+    });
+    chunks.iter().sum()
 }
 
 impl VolumeKeeper {
@@ -83,24 +77,20 @@ impl VolumeKeeper {
     }
 
     fn cubic(&self, positions: &[DVec3]) -> Cubic {
-        let partial: Vec<Cubic> = self
-            .moving
-            .par_chunks(CHUNK)
-            .map(|chunk| {
-                let mut sum = [0.0; 4];
-                for t in chunk {
-                    let [a, b, c] = t.map(|v| positions[v.index()] - self.center);
-                    let [u, v, w] = t.map(|v| self.directions[v.index()]);
-                    sum[0] += a.dot(b.cross(c));
-                    sum[1] += u.dot(b.cross(c)) + v.dot(c.cross(a)) + w.dot(a.cross(b));
-                    sum[2] += a.dot(v.cross(w)) + b.dot(w.cross(u)) + c.dot(u.cross(v));
-                    sum[3] += u.dot(v.cross(w));
-                }
-                sum
-            })
-            .collect();
+        let chunks = in_chunks(&self.moving, |_, chunk| {
+            let mut sum = [0.0; 4];
+            for t in chunk {
+                let [a, b, c] = t.map(|v| positions[v.index()] - self.center);
+                let [u, v, w] = t.map(|v| self.directions[v.index()]);
+                sum[0] += a.dot(b.cross(c));
+                sum[1] += u.dot(b.cross(c)) + v.dot(c.cross(a)) + w.dot(a.cross(b));
+                sum[2] += a.dot(v.cross(w)) + b.dot(w.cross(u)) + c.dot(u.cross(v));
+                sum[3] += u.dot(v.cross(w));
+            }
+            sum
+        });
         let mut sum = [self.still, 0.0, 0.0, 0.0];
-        for p in partial {
+        for p in chunks {
             for k in 0..4 {
                 sum[k] += p[k];
             }
@@ -182,10 +172,9 @@ impl VolumeKeeper {
                 break;
             }
         }
-        positions
-            .par_chunks_mut(CHUNK)
-            .zip(self.directions.par_chunks(CHUNK))
-            .for_each(|(p, d)| p.iter_mut().zip(d).for_each(|(p, d)| *p += tau * *d));
+        in_chunks_mut(positions, |base, chunk| {
+            chunk.iter_mut().zip(&self.directions[base..]).for_each(|(p, d)| *p += tau * *d);
+        });
         Ok(value(cubic, tau))
     }
 }
