@@ -15,10 +15,12 @@ pub(super) struct Plot {
     pub(super) series: Vec<Series>,
 }
 
-const WIDTH: f64 = 860.0;
-const HEIGHT: f64 = 480.0;
-/// Left, right, top, bottom.
-const MARGIN: [f64; 4] = [92.0, 270.0, 18.0, 52.0];
+/// Of the axes' box; the legend to its right adds what it needs.
+const BOX: [f64; 2] = [520.0, 410.0];
+/// Left, top, bottom.
+const MARGIN: [f64; 3] = [92.0, 18.0, 52.0];
+/// Width of a character of the legend: the widest common sans serif has 6.6 on average at its size.
+const CHARACTER: f64 = 6.8;
 /// Colours that differ in lightness as well; repeated with dashes.
 const COLORS: [&str; 6] = ["#1b4f8f", "#d1622b", "#2f8a57", "#8e3b8c", "#b8931f", "#5a5a5a"];
 /// Ticks aimed at on an axis.
@@ -57,13 +59,14 @@ impl Plot {
             let ((a, b), (c, d)) = (range(0), range(1));
             (ticks(a, b), ticks(c, d))
         };
-        let [left, right, top, bottom] = MARGIN;
-        let (w, h) = (WIDTH - left - right, HEIGHT - top - bottom);
+        let ([left, top, bottom], [w, h]) = (MARGIN, BOX);
+        let longest = self.series.iter().map(|s| s.name.chars().count()).max().unwrap_or(0);
+        let (width, height) = ((left + w + 56.0 + CHARACTER * longest as f64).ceil(), top + h + bottom);
         let x = |v: f64| left + w * (v - x_low) / (x_high - x_low);
         let y = |v: f64| top + h * (1.0 - (v - y_low) / (y_high - y_low));
         let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" \
-             font-size=\"13\">\n<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n"
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
+             font-size=\"13\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
         );
         // Writing to a string does not fail.
         let mut line = |text: std::fmt::Arguments<'_>| {
@@ -97,7 +100,7 @@ impl Plot {
         line(format_args!(
             "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
             left + w / 2.0,
-            HEIGHT - 12.0,
+            height - 12.0,
             escape(&self.x_label)
         ));
         line(format_args!(
@@ -118,6 +121,15 @@ impl Plot {
                 "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.8\"{dash}/>",
                 points.join(" ")
             ));
+            // A line that ends early is short and often under others: a dot says where it ends.
+            if let Some(p) = series.points.iter().rfind(finite).filter(|p| p[0] < x_high) {
+                line(format_args!(
+                    "<circle cx=\"{:.2}\" cy=\"{:.2}\" r=\"4\" fill=\"{}\" stroke=\"{color}\" stroke-width=\"1.8\"/>",
+                    x(p[0]),
+                    y(p[1]),
+                    if dash.is_empty() { color } else { "white" }
+                ));
+            }
             let at = top + 14.0 + 20.0 * k as f64;
             line(format_args!(
                 "<line x1=\"{0:.1}\" x2=\"{1:.1}\" y1=\"{at}\" y2=\"{at}\" stroke=\"{color}\" stroke-width=\"2.4\"{dash}/>\
