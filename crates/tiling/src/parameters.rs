@@ -48,7 +48,7 @@ impl Default for Parameters {
             lloyd_rounds: 2,
             follow_features: true,
             faces_per_tile: 24,
-            least_region: 1.0,
+            least_region: 0.5,
             normal_cone: 100.0,
         }
     }

@@ -66,8 +66,16 @@ pub(crate) fn tile(
     let wall = 2.0 * part.mesh.volume().abs() / part.mesh.area();
     let least_area =
         if parameters.follow_features { (parameters.least_region * wall).powi(2) } else { f64::INFINITY };
-    let (region_of_face, handed_back) = regions::choose(&refiner, least_area);
-    if handed_back > 0 {
+    let choice = regions::choose(&refiner, least_area);
+    let region_of_face = choice.region;
+    let (filled, depth) = choice.filled;
+    if filled > 0 {
+        progress.remark(&format!(
+            "{filled} faces smaller than the mesh's own are taken into the regions beside them, at most {depth:.2e} mm away"
+        ));
+    }
+    if choice.handed_back > 0 {
+        let handed_back = choice.handed_back;
         progress.remark(&format!(
             "{handed_back} faces of regions too small or pinched are tiled like free surface"
         ));
@@ -149,7 +157,9 @@ impl Construction<'_> {
         let (mut part, _) = self.surface.refiner.finish();
         // A face that was handed back is no longer part of a region that is a face of its own.
         for (own, chosen) in part.region_of_face.iter_mut().zip(&region_of_face) {
-            if own != chosen && regions.binary_search(own).is_ok() {
+            if chosen.is_some() {
+                *own = *chosen;
+            } else if own.is_some() && regions.binary_search(own).is_ok() {
                 *own = RegionId::NONE;
             }
         }

@@ -7,13 +7,23 @@
 use topipe_mesh::refine::Refiner;
 use topipe_mesh::{FaceId, HalfEdgeId, RegionId, VertexId};
 
-/// The region of each face that is taken out, and how many faces of regions are not.
-pub(crate) fn choose(refiner: &Refiner, least_area: f64) -> (Vec<RegionId>, usize) {
+/// Which regions are taken out.
+pub(crate) struct Choice {
+    /// The region of each face that is.
+    pub(crate) region: Vec<RegionId>,
+    /// Faces of regions that are not.
+    pub(crate) handed_back: usize,
+    /// Faces of dents that are taken out with the region around them, and the depth of the deepest, mm.
+    pub(crate) filled: (usize, f64),
+}
+
+pub(crate) fn choose(refiner: &Refiner, least_area: f64) -> Choice {
     let part = refiner.part();
     let count = part.regions.len();
     let mut region: Vec<RegionId> =
         part.region_of_face.iter().map(|&r| if r.index() < count { r } else { RegionId::NONE }).collect();
-    let before = region.iter().filter(|r| r.is_some()).count();
+    let before = region.clone();
+    let depth = fill_dents(refiner, &mut region);
     loop {
         let mut changed = keep_largest_component(refiner, &mut region, count, least_area);
         changed |= open_pinches(refiner, &mut region);
@@ -22,8 +32,60 @@ pub(crate) fn choose(refiner: &Refiner, least_area: f64) -> (Vec<RegionId>, usiz
             break;
         }
     }
-    let after = region.iter().filter(|r| r.is_some()).count();
-    (region, before - after)
+    let filled = before.iter().zip(&region).filter(|(was, is)| !was.is_some() && is.is_some()).count();
+    let handed_back = before.iter().zip(&region).filter(|(was, is)| was.is_some() && !is.is_some()).count();
+    Choice { region, handed_back, filled: (filled, if filled > 0 { depth } else { 0.0 }) }
+}
+
+/// Largest area of a dent over the mean area of a face, and its largest depth over the root of that.
+const DENT: (f64, f64) = (1.0, 0.25);
+
+/// Takes in pieces of free surface inside or beside a region that are smaller than a face of the mesh and shallow: a
+/// vertex that was off the shape, a splinter of a face beside a sharp edge. Patches of a hundredth of an edge would be
+/// all that comes of them. Returns the largest distance of such a piece from its shape.
+fn fill_dents(refiner: &Refiner, region: &mut [RegionId]) -> f64 {
+    let part = refiner.part();
+    let mesh = &part.mesh;
+    let mean = mesh.area() / mesh.face_count().max(1) as f64;
+    let mut seen = vec![false; region.len()];
+    let mut deepest = 0.0f64;
+    for start in 0..region.len() {
+        if region[start].is_some() || seen[start] {
+            continue;
+        }
+        seen[start] = true;
+        let (mut faces, mut beside) = (vec![FaceId::new(start)], Vec::new());
+        let mut next = 0;
+        while next < faces.len() {
+            for k in 0..3 {
+                let beyond = refiner.twin(HalfEdgeId::of(faces[next], k)).face();
+                let r = region[beyond.index()];
+                if r.is_some() {
+                    beside.push(r);
+                } else if !seen[beyond.index()] {
+                    seen[beyond.index()] = true;
+                    faces.push(beyond);
+                }
+            }
+            next += 1;
+        }
+        let area: f64 = faces.iter().map(|&f| mesh.area_vector(f).length() / 2.0).sum();
+        if area > DENT.0 * mean {
+            continue;
+        }
+        beside.sort_unstable();
+        beside.dedup();
+        let depth = |r: RegionId| {
+            let shape = &part.regions[r.index()].shape;
+            faces.iter().flat_map(|&f| mesh.corners(f)).map(|p| shape.distance(p).abs()).fold(0.0, f64::max)
+        };
+        let nearest = beside.iter().map(|&r| (r, depth(r))).min_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((r, depth)) = nearest.filter(|n| n.1 <= DENT.1 * mean.sqrt()) {
+            faces.iter().for_each(|f| region[f.index()] = r);
+            deepest = deepest.max(depth);
+        }
+    }
+    deepest
 }
 
 /// Hands back all but the largest edge-connected piece of each region, and that too where it is too small.
@@ -145,4 +207,79 @@ fn open_pinches(refiner: &Refiner, region: &mut [RegionId]) -> bool {
         }
     }
     changed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use topipe_mesh::{DVec3, Part, Region, RegionShape, TriangleMesh};
+
+    /// A box of 8 x 8 x 4 on a grid of unit squares; the top is a plane region but for the faces around one vertex,
+    /// which lies `depth` below it. One more free face in the region where `hole`.
+    fn dented(depth: f64, scale: f64) -> Part {
+        let n = 8u32;
+        let mut points: Vec<[f64; 3]> = Vec::new();
+        let mut index = std::collections::BTreeMap::new();
+        let mut triangles = Vec::new();
+        let mut at = |p: [u32; 3], points: &mut Vec<[f64; 3]>| {
+            *index.entry(p).or_insert_with(|| {
+                points.push(p.map(f64::from));
+                points.len() as u32 - 1
+            })
+        };
+        for axis in 0..3 {
+            for (level, outward) in [(0, false), (if axis == 2 { 4 } else { n }, true)] {
+                let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+                let most = |d: usize| if d == 2 { 4 } else { n };
+                for i in 0..most(u) {
+                    for j in 0..most(v) {
+                        let corner = |di: u32, dj: u32| {
+                            let mut p = [0; 3];
+                            (p[axis], p[u], p[v]) = (level, i + di, j + dj);
+                            p
+                        };
+                        let q = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)]
+                            .map(|p| at(p, &mut points));
+                        let q = if outward { q } else { [q[0], q[3], q[2], q[1]] };
+                        triangles.extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+                    }
+                }
+            }
+        }
+        let pit = index[&[4, 4, 4]] as usize;
+        points[pit][2] -= depth;
+        for p in points.iter_mut().flatten() {
+            *p *= scale;
+        }
+        let mut part = Part::new(TriangleMesh::from_arrays(points, triangles));
+        let top = 4.0 * scale;
+        part.regions.push(Region {
+            shape: RegionShape::Plane { point: DVec3::new(0.0, 0.0, top), normal: DVec3::Z },
+            area: 64.0 * scale * scale,
+            residual: 0.0,
+        });
+        let on_top = |p: DVec3| (p.z - top).abs() < 1e-9 * scale;
+        part.region_of_face = part
+            .mesh
+            .faces()
+            .map(|f| if part.mesh.corners(f).into_iter().all(on_top) { RegionId(0) } else { RegionId::NONE })
+            .collect();
+        part
+    }
+
+    #[test]
+    fn shallow_dents_smaller_than_a_face_are_filled_and_others_stay() {
+        for scale in [1e-3, 1.0, 1e3] {
+            // The six faces around a vertex are larger than one: they stay, however shallow.
+            let refiner = Refiner::new(&dented(0.01, scale)).unwrap();
+            assert_eq!(choose(&refiner, 0.0).filled.0, 0);
+            // A single face that is not the region's, but lies in it.
+            let mut part = dented(0.0, scale);
+            let one = part.region_of_face.iter().position(|r| r.is_some()).unwrap() + 40;
+            part.region_of_face[one] = RegionId::NONE;
+            let choice = choose(&Refiner::new(&part).unwrap(), 0.0);
+            assert_eq!((choice.filled.0, choice.handed_back), (1, 0));
+            assert!(choice.region[one].is_some() && choice.filled.1 < 1e-9 * scale);
+        }
+    }
 }
