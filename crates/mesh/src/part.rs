@@ -64,6 +64,22 @@ impl RegionShape {
         }
     }
 
+    /// How [`Self::normal`] changes at `p` in the direction `v`: its derivative. Zero on the axis of a cylinder.
+    pub fn turning(&self, p: DVec3, v: DVec3) -> DVec3 {
+        match *self {
+            Self::Plane { .. } => DVec3::ZERO,
+            Self::Cylinder { point, axis, .. } => {
+                let length = (p - point).reject_from_normalized(axis).length();
+                let normal = self.normal(p);
+                let across = v.reject_from_normalized(axis);
+                let out =
+                    if normal == DVec3::ZERO { DVec3::ZERO } else { across - across.dot(normal) * normal };
+                let sign = (p - point).dot(normal).signum();
+                if length > 0.0 { sign * out / length } else { DVec3::ZERO }
+            }
+        }
+    }
+
     /// The point of the shape nearest to `p`; `p` itself on the axis of a cylinder.
     pub fn project(&self, p: DVec3) -> DVec3 {
         p - self.normal(p) * self.distance(p)

@@ -36,7 +36,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = format!("fixtures/{name}/{name}.stl");
     let part = read(&path, &std::fs::read(&path)?, &ImportOptions::default())?;
     let part = topipe_smoothing::smooth(&part, &Default::default(), &silent)?;
-    let tiling = topipe_tiling::tile(&part, &Default::default(), &silent)?;
+    let tiling = topipe_tiling::tile(
+        &part,
+        &topipe_tiling::Parameters {
+            least_region: std::env::var("TP_LEAST").ok().and_then(|s| s.parse().ok()).unwrap_or(0.5),
+            normal_cone: std::env::var("TP_CONE").ok().and_then(|s| s.parse().ok()).unwrap_or(100.0),
+            ..Default::default()
+        },
+        &silent,
+    )?;
     let layout = topipe_quad_matching::match_quads(&tiling, &Default::default(), &silent)?;
     let start = Instant::now();
     let surface = fit(&layout, &parameters, &Units::none(), &Progress::new(Arc::new(Print)))?;
@@ -80,7 +88,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         above(90.0),
         jumps[jumps.len() / 2].0
     );
-    for &(jump, t, e, a, b) in jumps.iter().filter(|j| j.0 > 1.0).step_by(4).take(24) {
+    let place = |low: f64, high: f64| {
+        jumps.iter().filter(|j| j.0 > 0.1 && (low..high).contains(&j.1.min(1.0 - j.1))).count()
+    };
+    println!(
+        "above 0.1 at a corner: {}, within the first span of eight: {}, elsewhere: {}",
+        place(0.0, 1e-9),
+        place(1e-9, 0.125),
+        place(0.125, 1.0)
+    );
+    for &(jump, t, e, a, b) in jumps.iter().filter(|j| j.0 > 1.0).take(24) {
         let curve = &surface.edges[e];
         let chord = curve.control[0].distance(curve.control[curve.control.len() - 1]);
         println!("  {jump:8.3} at {t:.2} of edge {e}, length {chord:.2}, {:?}", curve.position(t));

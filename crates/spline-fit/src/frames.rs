@@ -121,7 +121,7 @@ pub(crate) fn crease_tangents(given: &Given<'_>) -> Vec<Option<DVec3>> {
 }
 
 /// Two directions at a corner give its normal where the angle between them is at least this: sine of 20 degrees.
-const CORNER: f64 = 0.342;
+pub(crate) const CORNER: f64 = 0.342;
 
 impl Frames {
     pub(crate) fn new(given: &Given<'_>, tangents: &[Option<DVec3>]) -> Result<Self, SplineFitError> {
@@ -193,11 +193,23 @@ fn frame(
                 let normal = across.normalize();
                 Known::Normal(if normal.dot(rough) < 0.0 { -normal } else { normal })
             } else {
-                Known::Tangent((a - b * a.dot(b).signum().min(0.0)).try_normalize().unwrap_or(a))
+                // One curve that passes through, in opposite directions, or two that leave side by side.
+                Known::Tangent((a + b * a.dot(b).signum()).try_normalize().unwrap_or(a))
             }
         }
     };
-    let surface = fit(known);
+    let mut surface = fit(known);
+    let borders: Vec<(DVec3, DVec3)> = sector
+        .spokes
+        .iter()
+        .zip(&fixed)
+        .filter_map(|(s, along)| {
+            let along = (*along)?;
+            let shape = given.tangent_to[s.edge as usize].as_ref()?;
+            Some((along, -shape.turning(at, along)))
+        })
+        .collect();
+    surface.bend_along(&borders);
     let (x, y) = {
         let first = fixed[0].unwrap_or_else(|| surface.normal.any_orthonormal_vector());
         let x = (first - first.dot(surface.normal) * surface.normal)

@@ -4,6 +4,7 @@
 //! turned until the quadric's gradient vanishes. What comes out is smooth where the mesh is faceted or noisy, and the
 //! same for all patches that use it.
 
+use crate::cholesky::Banded;
 use crate::samples::PatchSamples;
 use glam::DMat3;
 use topipe_mesh::DVec3;
@@ -18,6 +19,42 @@ pub(crate) struct LocalSurface {
     /// normal changes by -(form d), and the acceleration has the normal component d . form d.
     pub(crate) form: DMat3,
 }
+
+impl LocalSurface {
+    /// Changes the form, as little as possible, so that it maps each first vector, a direction in the tangent plane,
+    /// to the second: along the border of a shape the surface bends and twists as the shape does. Of two borders that
+    /// contradict each other something between comes out.
+    pub(crate) fn bend_along(&mut self, borders: &[(DVec3, DVec3)]) {
+        let Some(x) =
+            borders.first().and_then(|(d, _)| (*d - d.dot(self.normal) * self.normal).try_normalize())
+        else {
+            return;
+        };
+        let y = self.normal.cross(x);
+        // Entries xx, xy, yy, held weakly to what they are.
+        let mut matrix = Banded::zero(3, 2);
+        let now = [x.dot(self.form * x), x.dot(self.form * y), y.dot(self.form * y)];
+        let mut right = now.map(|v| v * WEAKLY);
+        (0..3).for_each(|i| matrix.add(i, i, WEAKLY));
+        for (direction, image) in borders {
+            let (c, s) = (direction.dot(x), direction.dot(y));
+            for (row, value) in [([c, s, 0.0], image.dot(x)), ([0.0, c, s], image.dot(y))] {
+                for i in 0..3 {
+                    right[i] += row[i] * value;
+                    (0..=i).for_each(|j| matrix.add(i, j, row[i] * row[j]));
+                }
+            }
+        }
+        if matrix.solve(&mut right).is_some() {
+            let outer = |p: DVec3, q: DVec3| DMat3::from_cols(p * q.x, p * q.y, p * q.z);
+            self.form =
+                outer(x, x) * right[0] + (outer(x, y) + outer(y, x)) * right[1] + outer(y, y) * right[2];
+        }
+    }
+}
+
+/// Weight of the form as fitted against what borders ask of it.
+const WEAKLY: f64 = 1e-9;
 
 /// What is already known at the point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -158,4 +195,27 @@ fn solve(mut a: [[f64; 6]; 6], mut b: [f64; 6]) -> Option<[f64; 6]> {
         b[k] /= a[k][k];
     }
     b.iter().all(|x| x.is_finite()).then_some(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_form_is_bent_along_a_border_and_kept_across_it() {
+        let outer = |p: DVec3, q: DVec3| DMat3::from_cols(p * q.x, p * q.y, p * q.z);
+        let (x, y) = (DVec3::X, DVec3::Y);
+        let form = outer(x, x) * 0.3 + outer(y, y) * 0.8;
+        let along = (x + y).normalize();
+        let mut surface = LocalSurface { position: DVec3::ZERO, normal: DVec3::Z, form };
+        surface.bend_along(&[(along, DVec3::ZERO)]);
+        assert!((surface.form * along).length() < 1e-6, "a plane does not bend");
+        let across = (y - x).normalize();
+        assert!((across.dot(surface.form * across) - across.dot(form * across)).abs() < 1e-6);
+        assert!((surface.form - surface.form.transpose()).abs_diff_eq(DMat3::ZERO, 1e-12));
+        // The same border from both sides of the vertex.
+        let mut both = LocalSurface { form, ..surface };
+        both.bend_along(&[(along, DVec3::ZERO), (-along, DVec3::ZERO)]);
+        assert!(both.form.abs_diff_eq(surface.form, 1e-6));
+    }
 }

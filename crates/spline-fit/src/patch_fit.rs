@@ -1,13 +1,13 @@
 //! One patch: the inside of its control net, between given borders.
 //!
-//! Least squares of the distance to the samples and of the bending energy (source, section 2.3), and of the angle
-//! between the cross derivative and the prescribed normals along each side that is tangent to its neighbour. Given
-//! borders and normals, a patch knows nothing of its neighbours: this is what makes it a unit of work of its own.
+//! Least squares of the distance to the samples and of the bending energy (source, section 2.3). Where a side has a
+//! ribbon (see [`crate::ribbon`]) the control points beside it are given too. So the coordinates do not depend on each
+//! other, and a patch knows nothing of its neighbours: this is what makes it a unit of work of its own.
 
 use crate::cholesky::Banded;
-use crate::energy::{Gram, gauss};
+use crate::energy::Gram;
 use crate::hermite;
-use crate::samples::PatchSamples;
+use crate::samples::{PatchSamples, Sample};
 use crate::{Basis, SurfacePoint};
 use topipe_mesh::DVec3;
 
@@ -18,29 +18,8 @@ pub(crate) struct Border {
     pub(crate) control: Vec<DVec3>,
     /// Spans of the patch along this side: those of the curve or more.
     pub(crate) spans: usize,
-    /// Unit normals at [`stations`] of the patch's own basis along this side; none at a crease.
-    pub(crate) normals: Option<Vec<DVec3>>,
-}
-
-/// Points along a span at which the tangent plane is asked for. Cross derivative and normal are cubic, so their
-/// product has seven coefficients a span, of which neighbouring spans share some.
-const STATIONS: usize = 5;
-
-/// Weight of the squared angle to the prescribed normals (times the patch's area) against the mean squared distance
-/// to the samples. Only its ratio to [`EVEN`] shows in the jumps: with 1e6 the largest jump on a sphere of 186 patches is
-/// 0.023 degrees at two spans and patches on a coarse torus fold, with 1e5 it is 0.027 and none does.
-const STIFF: f64 = 1e5;
-
-/// Weight, in the same terms, of the tangential part of the cross derivative against the one that goes evenly from
-/// the leg at one corner to the leg at the other. Without it the derivative may turn around near a corner, where the
-/// tangent planes leave little room: the patch would fold there.
-const EVEN: f64 = 0.1;
-
-/// Where along a side with `spans` spans normals are prescribed: parameters and weights that add up to one.
-pub(crate) fn stations(spans: usize) -> Vec<(f64, f64)> {
-    let rule = gauss(STATIONS);
-    let step = 1.0 / spans as f64;
-    (0..spans).flat_map(|k| rule.iter().map(move |(x, w)| ((k as f64 + x) * step, w * step))).collect()
+    /// From each control point of the patch's side to the one beside it; none at a crease.
+    pub(crate) ribbon: Option<Vec<DVec3>>,
 }
 
 /// Control net of a patch: u fastest.
@@ -68,7 +47,22 @@ impl Net {
     }
 
     pub(crate) fn evaluate(&self, u: f64, v: f64) -> SurfacePoint {
-        crate::surface::evaluate(&self.basis_u, &self.basis_v, &self.control, u, v)
+        let width = self.basis_u.len();
+        let (i, bu, su) = hermite::local(width / 2 - 1, u);
+        let (j, bv, sv) = hermite::local(self.basis_v.len() / 2 - 1, v);
+        let (mut position, mut du, mut dv) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        for l in 0..4 {
+            let row = &self.control[(j + l) * width + i..][..4];
+            let (mut value, mut slope) = (DVec3::ZERO, DVec3::ZERO);
+            for k in 0..4 {
+                value += bu[k] * row[k];
+                slope += su[k] * row[k];
+            }
+            position += bv[l] * value;
+            du += bv[l] * slope;
+            dv += sv[l] * value;
+        }
+        SurfacePoint { position, du, dv }
     }
 }
 
@@ -82,74 +76,107 @@ pub(crate) fn side_rows(k: usize, nu: usize, nv: usize) -> Vec<(usize, usize)> {
     }
 }
 
-/// How stiff a patch is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Stiffness {
-    /// Weight of the bending energy against the mean squared distance.
-    pub(crate) bending: f64,
-    /// Factor on the evenness of the cross derivatives.
-    pub(crate) even: f64,
+fn on_side(at: usize, nu: usize, nv: usize) -> bool {
+    let (i, j) = (at % nu, at / nu);
+    i == 0 || j == 0 || i == nu - 1 || j == nv - 1
 }
 
-/// Fits the inside. `None` when the equations are singular.
+/// Adds the normal equations of the squared distances. The samples of a cell of the net share their sixteen functions:
+/// their products are summed up in one small matrix before they are added to the large one.
+fn distance(
+    samples: &[Sample],
+    [ku, kv]: [usize; 2],
+    control: &[DVec3],
+    slots: &[Option<usize>],
+    matrix: &mut Banded,
+    right: &mut [DVec3],
+) {
+    let width = 2 * ku + 2;
+    let cell = |s: &Sample| {
+        let index = |t: f64, k: usize| ((t.clamp(0.0, 1.0) * k as f64) as usize).min(k - 1);
+        index(s.v, kv) * ku + index(s.u, ku)
+    };
+    let mut order: Vec<(usize, usize)> = samples.iter().enumerate().map(|(i, s)| (cell(s), i)).collect();
+    order.sort_unstable();
+    for group in order.chunk_by(|a, b| a.0 == b.0) {
+        let (mut products, mut sums) = ([[0.0; 16]; 16], [DVec3::ZERO; 16]);
+        for &(_, i) in group {
+            let sample = &samples[i];
+            let ((_, bu, _), (_, bv, _)) = (hermite::local(ku, sample.u), hermite::local(kv, sample.v));
+            let values: [f64; 16] = std::array::from_fn(|k| bu[k % 4] * bv[k / 4]);
+            for a in 0..16 {
+                let weighted = sample.weight * values[a];
+                sums[a] += weighted * sample.point;
+                for b in 0..16 {
+                    products[a][b] += weighted * values[b];
+                }
+            }
+        }
+        let first = group[0].0 / ku * 2 * width + group[0].0 % ku * 2;
+        let at = |k: usize| first + k / 4 * width + k % 4;
+        for a in 0..16 {
+            let Some(row) = slots[at(a)] else { continue };
+            right[row] += sums[a];
+            for b in 0..16 {
+                match slots[at(b)] {
+                    Some(column) => matrix.add(row, column, products[a][b]),
+                    None => right[row] -= products[a][b] * control[at(b)],
+                }
+            }
+        }
+    }
+}
+
+/// Fits the inside; `bending` is the weight of the bending energy against the mean squared distance. `None` when the
+/// equations are singular.
 pub(crate) fn fit_patch(
     samples: &PatchSamples,
     borders: &[Border; 4],
     grams: [&Gram; 2],
-    stiffness: Stiffness,
+    bending: f64,
 ) -> Option<Net> {
-    let (bending, even) = (stiffness.bending, EVEN * stiffness.even);
     let (ku, kv) = (borders[0].spans, borders[1].spans);
     let (basis_u, basis_v) = (hermite::basis(ku), hermite::basis(kv));
     let (nu, nv) = (basis_u.len(), basis_v.len());
     let mut control = vec![DVec3::ZERO; nu * nv];
+    let mut given = vec![false; nu * nv];
     for (k, border) in borders.iter().enumerate() {
         let row = hermite::refined(&border.control, if k % 2 == 0 { ku } else { kv });
         for ((at, _), point) in side_rows(k, nu, nv).into_iter().zip(row) {
             control[at] = point;
+            given[at] = true;
+        }
+    }
+    for (k, border) in borders.iter().enumerate() {
+        let Some(ribbon) = &border.ribbon else { continue };
+        for (&(on, beside), step) in side_rows(k, nu, nv).iter().zip(ribbon) {
+            // The first and the last lie on the sides before and after, which are given.
+            if !on_side(beside, nu, nv) {
+                control[beside] = control[on] + *step;
+                given[beside] = true;
+            }
         }
     }
 
     // Unknowns by the shorter direction first: a narrower band.
-    let (mu, mv) = (nu - 2, nv - 2);
-    let slot = |at: usize| {
-        let (i, j) = (at % nu, at / nu);
-        let inside = i > 0 && j > 0 && i < nu - 1 && j < nv - 1;
-        inside.then(|| if mu <= mv { (j - 1) * mu + i - 1 } else { (i - 1) * mv + j - 1 })
-    };
-    let slots: Vec<Option<usize>> = (0..nu * nv).map(slot).collect();
-    let count = mu * mv;
-    let band = 3 * mu.min(mv) + 3;
-    let mut scalar = Banded::zero(count, band);
+    let mut slots: Vec<Option<usize>> = vec![None; nu * nv];
+    let mut count = 0;
+    let by_rows = nu <= nv;
+    let (outer, inner) = if by_rows { (nv, nu) } else { (nu, nv) };
+    for a in 0..outer {
+        for b in 0..inner {
+            let at = if by_rows { a * nu + b } else { b * nu + a };
+            if !given[at] {
+                slots[at] = Some(count);
+                count += 1;
+            }
+        }
+    }
+    let band = 3 * inner + 3;
+    let mut matrix = Banded::zero(count, band);
     let mut right = vec![DVec3::ZERO; count];
 
-    // Distance.
-    let mut rows: Vec<(usize, f64)> = Vec::with_capacity(16);
-    let mut tally = |rows: &[(usize, f64)], point: DVec3, weight: f64| {
-        let known: DVec3 =
-            rows.iter().filter(|r| slots[r.0].is_none()).map(|&(at, value)| value * control[at]).sum();
-        let rest = point - known;
-        for &(a, value) in rows {
-            let Some(row) = slots[a] else { continue };
-            right[row] += weight * value * rest;
-            for &(b, other) in rows {
-                if let Some(column) = slots[b] {
-                    scalar.add(row, column, weight * value * other);
-                }
-            }
-        }
-    };
-    for sample in &samples.samples {
-        let (bu, bv) = (basis_u.evaluate(sample.u), basis_v.evaluate(sample.v));
-        rows.clear();
-        for j in 0..bv.count {
-            for i in 0..bu.count {
-                let value = bu.derivatives[0][i] * bv.derivatives[0][j];
-                rows.push(((bv.first + j) * nu + bu.first + i, value));
-            }
-        }
-        tally(&rows, sample.point, sample.weight);
-    }
+    distance(&samples.samples, [ku, kv], &control, &slots, &mut matrix, &mut right);
     // Bending.
     let reach = |k: usize, n: usize| k.saturating_sub(3)..(k + 4).min(n);
     for j in 1..nv - 1 {
@@ -162,7 +189,7 @@ pub(crate) fn fit_patch(
                             + 2.0 * grams[0].at(1, i, k) * grams[1].at(1, j, l)
                             + grams[0].at(0, i, k) * grams[1].at(2, j, l));
                     match slots[l * nu + k] {
-                        Some(column) => scalar.add(row, column, value),
+                        Some(column) => matrix.add(row, column, value),
                         None => right[row] -= value * control[l * nu + k],
                     }
                 }
@@ -170,67 +197,10 @@ pub(crate) fn fit_patch(
         }
     }
 
-    // Three coordinates each, coupled by the tangent planes.
-    let mut matrix = Banded::zero(3 * count, 3 * band + 2);
-    scalar.for_each(|i, j, value| {
-        for axis in 0..3 {
-            matrix.add(3 * i + axis, 3 * j + axis, value);
-        }
-    });
-    let mut flat: Vec<f64> = right.iter().flat_map(|r| r.to_array()).collect();
-    for (k, border) in borders.iter().enumerate() {
-        let Some(normals) = &border.normals else { continue };
-        let (basis, along, across) = if k % 2 == 0 { (&basis_u, ku, kv) } else { (&basis_v, kv, ku) };
-        let pairs = side_rows(k, nu, nv);
-        // Length of the derivative across the side, about: the mean length of the two sides that leave it.
-        let leg = |b: &Border| b.control[0].distance(b.control[b.control.len() - 1]);
-        let length = (leg(&borders[(k + 1) % 4]) + leg(&borders[(k + 3) % 4])) / 2.0;
-        let scale = 3.0 * across as f64 / length.max(f64::MIN_POSITIVE);
-        // The legs at both corners: what the derivative across is there.
-        let (first, last) = (pairs[0], pairs[pairs.len() - 1]);
-        let legs = [control[first.1] - control[first.0], control[last.1] - control[last.0]];
-        for ((t, w), normal) in stations(along).into_iter().zip(normals) {
-            let local = basis.evaluate(t);
-            let weight = samples.area * w * scale * scale;
-            // Derivative across, over 3 * across: what is known of it, less what it should be.
-            let mut known = -legs[0].lerp(legs[1], t);
-            let mut open = [(0usize, 0.0); 4];
-            let mut count = 0;
-            for m in 0..local.count {
-                let value = local.derivatives[0][m];
-                let (on, beside) = pairs[local.first + m];
-                known -= value * control[on];
-                match slots[beside] {
-                    Some(slot) => {
-                        open[count] = (slot, value);
-                        count += 1;
-                    }
-                    None => known += value * control[beside],
-                }
-            }
-            let height = known.dot(*normal) + legs[0].lerp(legs[1], t).dot(*normal);
-            let sideways = known - known.dot(*normal) * *normal;
-            let pull = weight * (STIFF * height * *normal + even * sideways);
-            let metric = |i: usize, j: usize| {
-                let across = normal[i] * normal[j];
-                weight * (STIFF * across + even * (f64::from(u8::from(i == j)) - across))
-            };
-            for &(a, x) in &open[..count] {
-                for i in 0..3 {
-                    flat[3 * a + i] -= x * pull[i];
-                    for &(b, y) in &open[..count] {
-                        for j in 0..3 {
-                            matrix.add(3 * a + i, 3 * b + j, x * y * metric(i, j));
-                        }
-                    }
-                }
-            }
-        }
-    }
-    matrix.solve(&mut flat)?;
+    matrix.solve(&mut right)?;
     for (at, slot) in slots.iter().enumerate() {
         if let Some(slot) = slot {
-            control[at] = DVec3::from_slice(&flat[3 * slot..3 * slot + 3]);
+            control[at] = right[*slot];
         }
     }
     Some(Net { basis_u, basis_v, control })

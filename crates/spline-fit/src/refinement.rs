@@ -2,18 +2,21 @@
 //!
 //! After each fit the surface is measured: the angle between the normals of two patches (or of a patch and the shape
 //! it is tangent to) along each edge that is no feature, and the distance of each sample from its patch. Edges where
-//! either is above its limit get twice as many spans, and the network is computed anew.
+//! the distance is above its limit get a finer curve, and the network is computed anew. Where only the angle is, curve
+//! and normals stay what they are: knots are inserted, with which the patches follow them more closely.
 
 use crate::fans::EdgeRole;
 use crate::samples::PatchSamples;
-use crate::tangent_fit::Setting;
+use crate::setting::Setting;
 use crate::{Parameters, Patch, SplineSurface};
 use rayon::prelude::*;
 use topipe_mesh::{DVec3, RegionShape};
 use topipe_progress::Progress;
 
-/// Most spans along an edge.
+/// Most spans of the curve along an edge, and of the patches beside it. The angle falls by about the fourth power of
+/// the length of a span.
 const MOST_SPANS: usize = 8;
+const MOST_PATCH_SPANS: usize = 16;
 
 /// Points along an edge where normals are compared.
 const POINTS: u32 = 33;
@@ -21,6 +24,7 @@ const POINTS: u32 = 33;
 /// The spans of all edges, and how often they may still be doubled.
 pub(crate) struct Refinement {
     spans: Vec<usize>,
+    patch_spans: Vec<usize>,
     left: u32,
     /// Largest distance, mm.
     tolerance: f64,
@@ -32,14 +36,21 @@ impl Refinement {
     pub(crate) fn new(setting: &Setting<'_>, parameters: &Parameters) -> Self {
         Self {
             spans: vec![parameters.spans as usize; setting.layout.edges.len()],
+            patch_spans: vec![parameters.spans as usize; setting.layout.edges.len()],
             left: parameters.refinements,
             tolerance: parameters.tolerance * setting.layout.part.mesh.diagonal(),
             angle: parameters.max_normal_jump,
         }
     }
 
+    /// Of the curves.
     pub(crate) fn spans(&self) -> &[usize] {
         &self.spans
+    }
+
+    /// Of the patches along the edges, at least those of the curves.
+    pub(crate) fn patch_spans(&self) -> &[usize] {
+        &self.patch_spans
     }
 
     /// Refines where `surface` is not within the limits. False when it is, or when nothing more can be done.
@@ -67,7 +78,7 @@ impl Refinement {
                 off.fold(0.0, f64::max)
             })
             .collect();
-        let mut finer: Vec<bool> = jumps.iter().map(|&jump| jump > self.angle).collect();
+        let mut finer = vec![false; jumps.len()];
         for (sides, &residual) in layout.quads.iter().zip(&residuals) {
             if residual > self.tolerance {
                 sides.iter().for_each(|side| finer[side.edge as usize] = true);
@@ -86,9 +97,14 @@ impl Refinement {
         let mut changed = false;
         if self.left > 0 {
             self.left -= 1;
-            for (spans, finer) in self.spans.iter_mut().zip(finer) {
-                if finer && *spans < MOST_SPANS {
-                    *spans *= 2;
+            for (e, finer) in finer.into_iter().enumerate() {
+                if finer && self.spans[e] < MOST_SPANS {
+                    self.spans[e] *= 2;
+                    self.patch_spans[e] = self.patch_spans[e].max(self.spans[e]);
+                    changed = true;
+                }
+                if jumps[e] > self.angle && self.patch_spans[e] < MOST_PATCH_SPANS {
+                    self.patch_spans[e] *= 2;
                     changed = true;
                 }
             }

@@ -8,7 +8,6 @@ use crate::fans::{Sectors, Spoke};
 use crate::frames::{Frames, Given, point_at};
 use crate::hermite;
 use crate::local_surface::{Known, LocalSurface, local_surface};
-use crate::twist::Leg;
 use topipe_mesh::DVec3;
 
 /// A curve, and the normals of the surface along it.
@@ -17,31 +16,29 @@ pub(crate) struct SmoothCurve {
     pub(crate) control: Vec<DVec3>,
     /// At the breaks.
     pub(crate) normals: Vec<DVec3>,
-    /// Derivatives of the normals there, by the curve's parameter.
-    pub(crate) turning: Vec<DVec3>,
+    /// Derivatives of the normals at both ends, by the curve's parameter.
+    pub(crate) turning: [DVec3; 2],
 }
 
 impl SmoothCurve {
-    /// The curve as it leaves its start, or backwards its end.
-    pub(crate) fn leg(&self, reversed: bool) -> Leg {
-        let last = self.control.len() - 1;
-        let point = |k: usize| self.control[if reversed { last - k } else { k }];
-        let spans = (self.control.len() / 2 - 1) as f64;
-        Leg {
-            first: 3.0 * spans * (point(1) - point(0)),
-            second: 6.0 * spans * spans * (point(0) - 2.0 * point(1) + point(2)),
-        }
+    /// Sets the derivative of the normal at an end, in the direction out of the vertex.
+    pub(crate) fn set_turning(&mut self, reversed: bool, turning: DVec3) {
+        self.turning[usize::from(reversed)] = if reversed { -turning } else { turning };
     }
 
-    /// Sets the derivative of the normal at an end, in the direction of [`Self::leg`].
-    pub(crate) fn set_turning(&mut self, reversed: bool, turning: DVec3) {
-        if reversed {
-            if let Some(last) = self.turning.last_mut() {
-                *last = -turning;
-            }
-        } else {
-            self.turning[0] = turning;
+    /// Control points of the normals over the basis of the curve. At the breaks they turn along the curve as it bends,
+    /// and about it such that their second derivative is continuous.
+    pub(crate) fn normal_control(&self) -> Vec<DVec3> {
+        let n = self.normals.len() - 1;
+        let mut slopes = clamped(&self.normals, self.turning);
+        for k in 1..n {
+            let [_, first, second] = hermite::derivatives(&self.control, k as f64 / n as f64);
+            let along = first.normalize_or_zero();
+            let across = self.normals[k].cross(along);
+            let bending = second.dot(self.normals[k]) / first.length();
+            slopes[k] = slopes[k].dot(across) * across - bending * along;
         }
+        hermite::control(&self.normals, &slopes)
     }
 }
 
@@ -89,20 +86,95 @@ pub(crate) fn smooth_curve(
     surfaces.push(end_data[1].0);
 
     let step = 1.0 / spans as f64;
-    let mut slopes = vec![DVec3::ZERO; spans + 1];
-    for k in 1..spans {
-        let slope = (points[k + 1] - points[k - 1]) / (2.0 * step);
-        let normal = surfaces[k].normal;
-        slopes[k] = slope - slope.dot(normal) * normal;
-    }
     // Along the given directions, as fast as the chord to the next break needs.
     let first = (points[1] - points[0]).length() / step;
     let last = (points[spans] - points[spans - 1]).length() / step;
-    slopes[0] = end_data[0].1 * speed(first, points[1] - points[0], end_data[0].1);
-    slopes[spans] = -end_data[1].1 * speed(last, points[spans - 1] - points[spans], end_data[1].1);
-    let normals: Vec<DVec3> = surfaces.iter().map(|s| s.normal).collect();
-    let turning: Vec<DVec3> = surfaces.iter().zip(&slopes).map(|(s, d)| -(s.form * *d)).collect();
+    let ends = [
+        end_data[0].1 * speed(first, points[1] - points[0], end_data[0].1),
+        -end_data[1].1 * speed(last, points[spans - 1] - points[spans], end_data[1].1),
+    ];
+    let slopes = curvature_continuous(&mut points, ends, [&surfaces[0], &surfaces[spans]]);
+    let across = |(surface, slope): (&LocalSurface, &DVec3)| {
+        let along = slope.try_normalize()?;
+        (surface.normal - surface.normal.dot(along) * along).try_normalize()
+    };
+    let normals: Vec<DVec3> = surfaces.iter().zip(&slopes).map(across).collect::<Option<_>>()?;
+    let turning = [0, spans].map(|k| -(surfaces[k].form * slopes[k]));
     Some(SmoothCurve { control: hermite::control(&points, &slopes), normals, turning })
+}
+
+/// Fewest spans of a curve that has room for the curvature of the surface at its ends.
+const ROOM: usize = 4;
+
+/// Slopes at the breaks of the curve through `points` with the given slopes at its ends whose second derivative is
+/// continuous: only then do the normals along it turn without jumps. From [`ROOM`] spans on the points between move,
+/// as little as possible, so that at its ends the curve bends as the local surfaces do, on which the mixed derivatives
+/// of the patches at the vertex agree.
+fn curvature_continuous(points: &mut [DVec3], ends: [DVec3; 2], surfaces: [&LocalSurface; 2]) -> Vec<DVec3> {
+    let n = points.len() - 1;
+    let slopes = clamped(points, ends);
+    if n < ROOM {
+        return slopes;
+    }
+    // The second derivative at the start per height of each point, all others zero; at the end it is the mirror image.
+    let response: Vec<f64> = (1..n)
+        .map(|k| {
+            let mut unit = vec![DVec3::ZERO; n + 1];
+            unit[k] = DVec3::X;
+            let slopes = clamped(&unit, [DVec3::ZERO; 2]);
+            (second_at_start(&unit, &slopes)).x
+        })
+        .collect();
+    let mirrored: Vec<f64> = response.iter().rev().copied().collect();
+    let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(x, y)| x * y).sum() };
+    let [a, b] = surfaces.map(|s| s.normal);
+    let backwards = |v: &[DVec3]| v.iter().rev().copied().collect::<Vec<DVec3>>();
+    let (back_points, back_slopes) =
+        (backwards(points), backwards(&slopes).into_iter().map(|s| -s).collect::<Vec<DVec3>>());
+    let missing = [
+        ends[0].dot(surfaces[0].form * ends[0]) - a.dot(second_at_start(points, &slopes)),
+        ends[1].dot(surfaces[1].form * ends[1]) - b.dot(second_at_start(&back_points, &back_slopes)),
+    ];
+    // Two conditions on the heights along both normals; the least change that meets them.
+    let (own, mixed) = (dot(&response, &response), a.dot(b) * dot(&response, &mirrored));
+    let determinant = own * own - mixed * mixed;
+    let weights = [
+        (own * missing[0] - mixed * missing[1]) / determinant,
+        (own * missing[1] - mixed * missing[0]) / determinant,
+    ];
+    if weights.iter().all(|w| w.is_finite()) {
+        for k in 1..n {
+            points[k] += weights[0] * response[k - 1] * a + weights[1] * mirrored[k - 1] * b;
+        }
+    }
+    clamped(points, ends)
+}
+
+/// The second derivative by the parameter at the first point.
+fn second_at_start(points: &[DVec3], slopes: &[DVec3]) -> DVec3 {
+    let spans = (points.len() - 1) as f64;
+    6.0 * spans * spans * (points[1] - points[0]) - spans * (4.0 * slopes[0] + 2.0 * slopes[1])
+}
+
+/// Slopes of the clamped cubic spline through points at equal steps (Thomas's algorithm on its tridiagonal system).
+fn clamped(points: &[DVec3], ends: [DVec3; 2]) -> Vec<DVec3> {
+    let n = points.len() - 1;
+    let spans = n as f64;
+    let mut slopes = vec![DVec3::ZERO; n + 1];
+    (slopes[0], slopes[n]) = (ends[0], ends[1]);
+    let mut pivots = vec![4.0; n + 1];
+    for k in 1..n {
+        let right = 3.0 * spans * (points[k + 1] - points[k - 1]);
+        let (factor, before) = if k == 1 { (1.0, ends[0]) } else { (1.0 / pivots[k - 1], slopes[k - 1]) };
+        slopes[k] = right - factor * before;
+        if k > 1 {
+            pivots[k] = 4.0 - factor;
+        }
+    }
+    for k in (1..n).rev() {
+        slopes[k] = (slopes[k] - slopes[k + 1]) / pivots[k];
+    }
+    slopes
 }
 
 /// Points of a path at even distances, and rounds in which each moves to the middle of its neighbours: zigzags of up to
@@ -128,4 +200,49 @@ fn straightened(path: &[DVec3]) -> Vec<DVec3> {
 fn speed(chord: f64, towards: DVec3, direction: DVec3) -> f64 {
     let cosine = towards.normalize_or_zero().dot(direction);
     chord * cosine.clamp(0.5, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+
+    #[test]
+    fn curves_bend_without_jumps_and_as_asked_at_their_ends() {
+        let surface = |normal: DVec3, bend: f64| {
+            let form = DMat3::IDENTITY * bend;
+            LocalSurface { position: DVec3::ZERO, normal, form }
+        };
+        for n in [2, 4, 8] {
+            let before: Vec<DVec3> = (0..=n)
+                .map(|k| {
+                    let x = k as f64 / n as f64;
+                    DVec3::new(x, 0.1 * (3.0 * x).sin(), 0.2 * x * x + 0.01 * (9.0 * x).cos())
+                })
+                .collect();
+            let mut points = before.clone();
+            let ends = [DVec3::new(1.0, 0.3, 0.0), DVec3::new(1.0, -0.2, 0.4)];
+            let normals = [DVec3::Z, DVec3::new(-0.4, 0.0, 1.0).normalize()];
+            let surfaces = [surface(normals[0], 0.7), surface(normals[1], -0.2)];
+            let slopes = curvature_continuous(&mut points, ends, [&surfaces[0], &surfaces[1]]);
+            assert_eq!((slopes[0], slopes[n]), (ends[0], ends[1]));
+            let control = hermite::control(&points, &slopes);
+            for k in 1..n {
+                let t = k as f64 / n as f64;
+                let second = |t: f64| hermite::derivatives(&control, t)[2];
+                assert!(second(t - 1e-9).distance(second(t + 1e-9)) < 1e-5, "{n} spans at {t}");
+            }
+            let moved = points.iter().zip(&before).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+            if n < ROOM {
+                assert_eq!(moved, 0.0);
+                continue;
+            }
+            assert!(moved > 0.0 && moved < 0.05, "{moved}");
+            for (k, t) in [0.0, 1.0].into_iter().enumerate() {
+                let bend = hermite::derivatives(&control, t)[2].dot(normals[k]);
+                let asked = ends[k].dot(surfaces[k].form * ends[k]);
+                assert!((bend - asked).abs() < 1e-9, "{bend} for {asked}");
+            }
+        }
+    }
 }

@@ -21,10 +21,26 @@ pub(crate) struct Leg {
     pub(crate) first: DVec3,
     /// Second derivative.
     pub(crate) second: DVec3,
+    /// The derivative of the normal, where it is given: along the border of a shape.
+    pub(crate) turning: Option<DVec3>,
+}
+
+/// A curve as it leaves its start, or backwards its end, from its control points over a basis with double knots.
+pub(crate) fn leg(control: &[DVec3], reversed: bool) -> Leg {
+    let last = control.len() - 1;
+    let point = |k: usize| control[if reversed { last - k } else { k }];
+    let spans = (control.len() / 2 - 1) as f64;
+    Leg {
+        first: 3.0 * spans * (point(1) - point(0)),
+        second: 6.0 * spans * spans * (point(0) - 2.0 * point(1) + point(2)),
+        turning: None,
+    }
 }
 
 /// Weight of the torsions of the shape operator against those that make the corners agree.
 const HOLD: f64 = 1e-4;
+/// The same for torsions that are given.
+const GIVEN: f64 = 1e6;
 
 /// Derivatives of the normal along each leg. `legs` are in order around the vertex, `None` for creases, where nothing
 /// is asked for; `closed` tells whether the last and the first bound a corner.
@@ -38,6 +54,7 @@ pub(crate) fn turning(surface: &LocalSurface, legs: &[Option<Leg>], closed: bool
         /// Of the shape operator.
         torsion: f64,
         length: f64,
+        hold: f64,
     }
     let data: Vec<Option<Datum>> = legs
         .iter()
@@ -47,8 +64,11 @@ pub(crate) fn turning(surface: &LocalSurface, legs: &[Option<Leg>], closed: bool
             let along = (leg.first - leg.first.dot(normal) * normal).try_normalize()?;
             let across = normal.cross(along);
             let curvature = leg.second.dot(normal) / (length * length);
-            let torsion = across.dot(surface.form * along);
-            Some(Datum { along, across, curvature, torsion, length })
+            let (torsion, hold) = match leg.turning {
+                Some(turning) => (-across.dot(turning) / length, GIVEN),
+                None => (across.dot(surface.form * along), HOLD),
+            };
+            Some(Datum { along, across, curvature, torsion, length, hold })
         })
         .collect();
     let corners: Vec<(usize, usize)> = (0..n)
@@ -58,10 +78,9 @@ pub(crate) fn turning(surface: &LocalSurface, legs: &[Option<Leg>], closed: bool
     let mut matrix = Banded::zero(n, n);
     let mut right = vec![0.0; n];
     for (i, datum) in data.iter().enumerate() {
-        matrix.add(i, i, HOLD);
-        if let Some(datum) = datum {
-            right[i] += HOLD * datum.torsion;
-        }
+        let (hold, torsion) = datum.as_ref().map_or((HOLD, 0.0), |d| (d.hold, d.torsion));
+        matrix.add(i, i, hold);
+        right[i] += hold * torsion;
     }
     for (i, j) in corners {
         let (Some(a), Some(b)) = (&data[i], &data[j]) else { continue };
@@ -101,7 +120,7 @@ mod tests {
                     let angle = k as f64 / n as f64 * std::f64::consts::TAU + 0.1 * (k as f64).sin();
                     let first = DVec3::new(angle.cos(), angle.sin(), 0.0) * (1.0 + 0.1 * k as f64);
                     let second = DVec3::new(0.3, 0.1 * k as f64, first.dot(form * first));
-                    Some(Leg { first, second })
+                    Some(Leg { first, second, turning: None })
                 })
                 .collect();
             for (leg, turn) in legs.iter().zip(turning(&surface, &legs, true)) {
@@ -120,7 +139,7 @@ mod tests {
                 .map(|k| {
                     let angle = k as f64 / n as f64 * std::f64::consts::TAU;
                     let first = DVec3::new(angle.cos(), angle.sin(), 0.0);
-                    Some(Leg { first, second: DVec3::Z * (k as f64 * 1.7).sin() })
+                    Some(Leg { first, second: DVec3::Z * (k as f64 * 1.7).sin(), turning: None })
                 })
                 .collect();
             let turns = turning(&surface, &legs, true);

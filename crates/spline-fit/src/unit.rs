@@ -32,8 +32,8 @@ pub(crate) fn key(
         hasher = hasher
             .u64(border.spans as u64)
             .f64s(&flat(&border.control))
-            .u64(border.normals.is_some().into())
-            .f64s(&flat(border.normals.as_deref().unwrap_or(&[])));
+            .u64(border.ribbon.is_some().into())
+            .f64s(&flat(border.ribbon.as_deref().unwrap_or(&[])));
     }
     hasher.f64s(&corners.map(|c| c.to_array()).concat()).finish()
 }

@@ -1,0 +1,103 @@
+//! Vertices and edges of the fit with tangents: curves that patches share, and the normals along them.
+
+use crate::SplineFitError;
+use crate::crease_curves;
+use crate::fans::{EdgeRole, Spoke};
+use crate::frames::{Frames, crease_tangents};
+use crate::samples::PatchSamples;
+use crate::setting::Setting;
+use crate::smooth_curves::{SmoothCurve, smooth_curve};
+use crate::twist::{Leg, leg, turning};
+use rayon::prelude::*;
+use topipe_mesh::DVec3;
+
+/// A curve and, where patches have tangent planes along it, its normals.
+pub(crate) struct Curve {
+    pub(crate) control: Vec<DVec3>,
+    /// Control points of the normals over the same basis.
+    pub(crate) normals: Option<Vec<DVec3>>,
+}
+
+/// Vertices and edges.
+pub(crate) struct Network {
+    pub(crate) frames: Frames,
+    pub(crate) curves: Vec<Curve>,
+}
+
+/// Finds vertices and edges; `spans` are those of the curves.
+pub(crate) fn network(
+    setting: &Setting<'_>,
+    samples: &[PatchSamples],
+    spans: &[usize],
+) -> Result<Network, SplineFitError> {
+    let layout = setting.layout;
+    let reach = setting.reach(spans);
+    let given = setting.given(samples, &reach);
+    let singular = |e: usize| {
+        let at = layout.part.mesh.position(layout.edges[e].path[0]);
+        SplineFitError::Singular { what: "edge", index: e, x: at.x, y: at.y, z: at.z }
+    };
+    let tangents = crease_tangents(&given);
+    let frames = Frames::new(&given, &tangents)?;
+    let mut smooth: Vec<Option<SmoothCurve>> = (0..layout.edges.len())
+        .into_par_iter()
+        .map(|e| match setting.roles[e] {
+            EdgeRole::Smooth => {
+                smooth_curve(&given, &setting.sectors, &frames, e, &setting.beside[e], spans[e])
+                    .map(Some)
+                    .ok_or_else(|| singular(e))
+            }
+            _ => Ok(None),
+        })
+        .collect::<Result<_, _>>()?;
+    // The normals at the ends turn as the curves that meet there bend.
+    for (sector, frame) in setting.sectors.list.iter().zip(&frames.frames) {
+        let legs: Vec<Option<Leg>> = sector
+            .spokes
+            .iter()
+            .map(|s| match &smooth[s.edge as usize] {
+                Some(curve) => Some(leg(&curve.control, s.reversed)),
+                None => border_leg(setting, *s),
+            })
+            .collect();
+        for (spoke, turn) in sector.spokes.iter().zip(turning(&frame.surface, &legs, sector.closed)) {
+            if let (Some(curve), Some(turn)) = (&mut smooth[spoke.edge as usize], turn) {
+                curve.set_turning(spoke.reversed, turn);
+            }
+        }
+    }
+    let curves = smooth
+        .into_par_iter()
+        .enumerate()
+        .map(|(e, smooth)| {
+            if let Some(curve) = smooth {
+                let normals = curve.normal_control();
+                return Some(Curve { control: curve.control, normals: Some(normals) });
+            }
+            if let Some(curve) = &setting.borders.curves[e] {
+                return Some(Curve { control: curve.control.clone(), normals: None });
+            }
+            let points = given.path(Spoke { edge: e as u32, reversed: false });
+            let ends = layout.edges[e].ends.map(|v| frames.positions[v as usize]);
+            let directions = [false, true].map(|reversed| {
+                given
+                    .fixed_direction(Spoke { edge: e as u32, reversed }, &tangents)
+                    .map(|d| if reversed { -d } else { d })
+            });
+            let control = crease_curves::fit(&points, ends, directions, spans[e])?;
+            Some(Curve { control, normals: None })
+        })
+        .enumerate()
+        .map(|(e, curve)| curve.ok_or_else(|| singular(e)))
+        .collect::<Result<_, _>>()?;
+    Ok(Network { frames, curves })
+}
+
+/// The border of a shape as it leaves a vertex, where the patches beside it are tangent to the shape.
+fn border_leg(setting: &Setting<'_>, spoke: Spoke) -> Option<Leg> {
+    let e = spoke.edge as usize;
+    let (shape, curve) = (setting.tangent_to[e].as_ref()?, setting.borders.curves[e].as_ref()?);
+    let leg = leg(&curve.control, spoke.reversed);
+    let at = curve.control[if spoke.reversed { curve.control.len() - 1 } else { 0 }];
+    Some(Leg { turning: Some(shape.turning(at, leg.first)), ..leg })
+}

@@ -1,0 +1,184 @@
+//! The patches of the fit with tangents, each for itself.
+
+use crate::energy::Gram;
+use crate::hermite;
+use crate::network::{Curve, Network};
+use crate::patch_fit::{Border, Net, fit_patch};
+use crate::ribbon::{Normals, Side, ribbons};
+use crate::samples::PatchSamples;
+use crate::setting::Setting;
+use crate::unit;
+use crate::{Parameters, SplineFitError};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use topipe_mesh::DVec3;
+use topipe_progress::{Progress, UnitKey, Units};
+
+/// What a patch was fitted to, and what came of it.
+pub(crate) struct Fitted {
+    borders: [Border; 4],
+    corners: [DVec3; 4],
+    pub(crate) net: Net,
+    /// Parameters of the samples' foot points.
+    places: Vec<[f64; 2]>,
+}
+
+/// What all patches are fitted with.
+pub(crate) struct Patches<'a> {
+    pub(crate) setting: &'a Setting<'a>,
+    pub(crate) parameters: &'a Parameters,
+    pub(crate) units: &'a Units,
+    pub(crate) progress: &'a Progress,
+}
+
+impl Patches<'_> {
+    /// The insides of all patches, with at least `spans` along each edge; the samples end at their foot points. What was
+    /// `before` is taken over where nothing has changed.
+    pub(crate) fn fit(
+        &self,
+        samples: &mut [PatchSamples],
+        network: &Network,
+        spans: &[usize],
+        before: Vec<Fitted>,
+    ) -> Result<Vec<Fitted>, SplineFitError> {
+        let Self { setting, parameters, units, progress } = *self;
+        let layout = setting.layout;
+        let borders: Vec<[Border; 4]> = (0..layout.quads.len())
+            .into_par_iter()
+            .map(|quad| borders_of(setting, quad, &network.curves, spans))
+            .collect();
+        let corners: Vec<[DVec3; 4]> = setting
+            .sectors
+            .at
+            .iter()
+            .map(|sectors| sectors.map(|sector| network.frames.frames[sector as usize].surface.normal))
+            .collect();
+        let keys: Vec<UnitKey> = if units.are_kept() {
+            samples
+                .par_iter()
+                .zip(&borders)
+                .zip(&corners)
+                .map(|((samples, borders), corners)| unit::key(samples, borders, corners, parameters))
+                .collect()
+        } else {
+            Vec::new()
+        };
+        units.announce("patches", &keys);
+        let most = borders.iter().flatten().map(|b| b.spans).max().unwrap_or(1);
+        let grams: Vec<Gram> = (0..=most.ilog2()).map(|k| Gram::new(&hermite::basis(1 << k))).collect();
+        let done = AtomicU64::new(0);
+        let mut before: Vec<Option<Fitted>> = before.into_iter().map(Some).collect();
+        before.resize_with(samples.len(), || None);
+        samples
+            .par_iter_mut()
+            .zip(before)
+            .zip(borders.par_iter().zip(&corners))
+            .enumerate()
+            .map(|(quad, ((samples, before), (borders, corners)))| {
+                progress.check()?;
+                // Knots were inserted elsewhere.
+                if let Some(same) = before.filter(|b| b.borders == *borders && b.corners == *corners) {
+                    for (sample, place) in samples.samples.iter_mut().zip(&same.places) {
+                        [sample.u, sample.v] = *place;
+                    }
+                    return Ok(same);
+                }
+                let compute = |samples: &mut PatchSamples| {
+                    let grams = [0, 1].map(|k| &grams[borders[k].spans.ilog2() as usize]);
+                    rounds(samples, borders, corners, grams, parameters).ok_or_else(|| {
+                        let at = layout.part.mesh.position(layout.vertices[layout.corners(quad)[0] as usize]);
+                        SplineFitError::Singular { what: "patch", index: quad, x: at.x, y: at.y, z: at.z }
+                    })
+                };
+                let net = match keys.get(quad) {
+                    Some(&key) => unit::recall(units, key, samples, borders, compute)?,
+                    None => compute(samples)?,
+                };
+                let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+                if count.is_multiple_of(64) {
+                    progress.step(count, layout.quads.len() as u64, "patches");
+                }
+                let places = samples.samples.iter().map(|s| [s.u, s.v]).collect();
+                Ok(Fitted { borders: borders.clone(), corners: *corners, net, places })
+            })
+            // The first error in the order of the quads, for any number of threads.
+            .collect::<Vec<Result<Fitted, SplineFitError>>>()
+            .into_iter()
+            .collect()
+    }
+}
+
+/// Spans along the side of a patch.
+fn side_spans(curve: &Curve, spans: usize) -> usize {
+    (curve.control.len() / 2 - 1).max(spans)
+}
+
+/// Factors on the bending energy with which a patch is tried until it is nowhere turned over.
+const STIFFER: [f64; 3] = [1.0, 1e2, 1e4];
+
+/// A fit, and fits to the foot points on the one before; stiffer where the patch would fold.
+fn rounds(
+    samples: &mut PatchSamples,
+    borders: &[Border; 4],
+    corners: &[DVec3; 4],
+    grams: [&Gram; 2],
+    parameters: &Parameters,
+) -> Option<Net> {
+    let places: Vec<[f64; 2]> = samples.samples.iter().map(|s| [s.u, s.v]).collect();
+    let mut best: Option<(f64, Net, Vec<[f64; 2]>)> = None;
+    for factor in STIFFER {
+        let bending = factor * (1.0 - parameters.lambda);
+        for (sample, place) in samples.samples.iter_mut().zip(&places) {
+            [sample.u, sample.v] = *place;
+        }
+        let mut net = fit_patch(samples, borders, grams, bending)?;
+        for _ in 0..parameters.foot_point_rounds {
+            crate::foot_points::correct(samples, |u, v| net.evaluate(u, v));
+            net = fit_patch(samples, borders, grams, bending)?;
+        }
+        let folded = net.folded(corners);
+        if best.as_ref().is_none_or(|b| folded < b.0) {
+            best = Some((folded, net, samples.samples.iter().map(|s| [s.u, s.v]).collect()));
+        }
+        if folded == 0.0 {
+            break;
+        }
+    }
+    let (_, net, places) = best?;
+    for (sample, place) in samples.samples.iter_mut().zip(places) {
+        [sample.u, sample.v] = place;
+    }
+    Some(net)
+}
+
+/// The borders of a patch, with their ribbons.
+fn borders_of(setting: &Setting<'_>, quad: usize, curves: &[Curve], spans: &[usize]) -> [Border; 4] {
+    let quad = setting.layout.quads[quad];
+    let own = |k: usize| {
+        let e = quad[k].edge as usize;
+        side_spans(&curves[e], spans[e])
+    };
+    let sides = [0, 1, 2, 3].map(|k| {
+        let e = quad[k].edge as usize;
+        let curve = &curves[e];
+        let normals = match (&curve.normals, &setting.tangent_to[e]) {
+            (Some(normals), _) => Some(Normals::Prescribed(normals)),
+            (None, Some(shape)) => Some(Normals::Of(shape)),
+            _ => None,
+        };
+        Side {
+            control: &curve.control,
+            reversed: quad[k].reversed,
+            normals,
+            spans: own(k).max(own((k + 2) % 4)),
+        }
+    });
+    let mut ribbons = ribbons(&sides);
+    [0, 1, 2, 3].map(|k| {
+        let mut control = sides[k].control.to_vec();
+        if sides[k].reversed {
+            control.reverse();
+        }
+        Border { control, spans: sides[k].spans, ribbon: ribbons[k].take() }
+    })
+}

@@ -1,0 +1,124 @@
+//! What the edges of a layout are, and what is fixed before the fit.
+
+use crate::SplineFitError;
+use crate::borders::sharpness;
+use crate::borders::{Borders, borders};
+use crate::corners::corners;
+use crate::fans::{EdgeRole, Sectors, quads_beside};
+use crate::frames::{Given, crease_tangents};
+use crate::samples::PatchSamples;
+use topipe_mesh::{Connectivity, FeatureKind, RegionShape};
+use topipe_progress::Progress;
+use topipe_quad_matching::QuadLayout;
+
+/// Radius of the local fits over the length of a span.
+const REACH: f64 = 1.25;
+/// From this number of spans on the local fits stay as they are: knots then make the surface follow its normals, and
+/// no longer finer waves of the mesh.
+const FINEST_REACH: usize = 4;
+
+/// Roles of the edges, borders, and the fans around the vertices.
+pub(crate) struct Setting<'a> {
+    pub(crate) layout: &'a QuadLayout,
+    pub(crate) borders: Borders,
+    pub(crate) beside: Vec<Vec<(u32, u8)>>,
+    pub(crate) roles: Vec<EdgeRole>,
+    /// Why each edge is a feature, where the mesh is sharp along it.
+    pub(crate) features: Vec<Option<FeatureKind>>,
+    /// The shape that a patch meets smoothly along its border.
+    pub(crate) tangent_to: Vec<Option<RegionShape>>,
+    pub(crate) sectors: Sectors,
+    lengths: Vec<f64>,
+}
+
+impl<'a> Setting<'a> {
+    pub(crate) fn new(layout: &'a QuadLayout) -> Result<Self, SplineFitError> {
+        let borders = borders(layout)?;
+        let mesh = &layout.part.mesh;
+        let connectivity =
+            Connectivity::build(mesh).map_err(|error| SplineFitError::Layout(error.to_string()))?;
+        let beside = quads_beside(layout);
+        let (mut roles, mut features) = (Vec::new(), Vec::new());
+        for (e, edge) in layout.edges.iter().enumerate() {
+            let feature = match &borders.curves[e] {
+                Some(curve) => curve.feature,
+                // Where a feature fades the mesh is smooth, and so is the surface.
+                None if edge.feature.is_some() => {
+                    sharpness::feature(layout, &connectivity, e, [None, None], &[]).and(edge.feature)
+                }
+                None => None,
+            };
+            features.push(feature);
+            roles.push(match beside[e].len() {
+                0 => EdgeRole::Inner,
+                1 => EdgeRole::Border,
+                _ if feature.is_some() => EdgeRole::Crease,
+                _ => EdgeRole::Smooth,
+            });
+        }
+        let mut tangent_to = vec![None; layout.edges.len()];
+        for face in &borders.faces {
+            for side in face.loops.iter().flatten() {
+                let e = side.edge as usize;
+                if roles[e] == EdgeRole::Border && features[e].is_none() {
+                    tangent_to[e] = Some(face.shape);
+                }
+            }
+        }
+        let sectors = Sectors::new(layout, &roles);
+        let length = |path: &[topipe_mesh::VertexId]| -> f64 {
+            path.windows(2).map(|w| mesh.position(w[0]).distance(mesh.position(w[1]))).sum()
+        };
+        let lengths = layout.edges.iter().map(|e| length(&e.path)).collect();
+        for (e, role) in roles.iter().enumerate() {
+            if matches!(role, EdgeRole::Border | EdgeRole::Inner) && borders.curves[e].is_none() {
+                let at = mesh.position(layout.edges[e].path[0]);
+                return Err(SplineFitError::Singular { what: "edge", index: e, x: at.x, y: at.y, z: at.z });
+            }
+        }
+        Ok(Self { layout, borders, beside, roles, features, tangent_to, sectors, lengths })
+    }
+
+    /// Radius of the local fits, one per edge.
+    pub(crate) fn reach(&self, spans: &[usize]) -> Vec<f64> {
+        self.lengths.iter().zip(spans).map(|(l, &k)| REACH * l / k.min(FINEST_REACH) as f64).collect()
+    }
+
+    pub(crate) fn given<'b>(&'b self, samples: &'b [PatchSamples], reach: &'b [f64]) -> Given<'b> {
+        Given {
+            layout: self.layout,
+            roles: &self.roles,
+            sectors: &self.sectors,
+            samples,
+            curves: &self.borders.curves,
+            vertices: &self.borders.vertices,
+            tangent_to: &self.tangent_to,
+            reach,
+        }
+    }
+
+    /// Gives up tangency where the mesh has corners.
+    pub(crate) fn make_corners(&mut self, samples: &[PatchSamples], spans: usize, progress: &Progress) {
+        let reach = self.reach(&vec![spans; self.lengths.len()]);
+        let given = self.given(samples, &reach);
+        let corners = corners(&given, &crease_tangents(&given));
+        for &e in &corners.creases {
+            self.roles[e] = EdgeRole::Crease;
+            self.features[e] = Some(FeatureKind::Sharp);
+        }
+        for &e in &corners.sharp_borders {
+            self.tangent_to[e] = None;
+            self.features[e] = Some(FeatureKind::RegionBorder);
+            if let Some(curve) = &mut self.borders.curves[e] {
+                curve.feature = self.features[e];
+            }
+        }
+        if !corners.creases.is_empty() {
+            self.sectors = Sectors::new(self.layout, &self.roles);
+            progress.remark(&format!(
+                "{} edges run into corners of borders and are creases that fade",
+                corners.creases.len()
+            ));
+        }
+    }
+}
