@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// Stage, its crate, and the file of its adapter in `stages` and of its writers in `export`. Pictures are no stage, they
 /// have a writer only.
-const PARTS: [(&str, &str, &str); 11] = [
+const PARTS: [(&str, &str, &str); 12] = [
     ("IMPORT", "mesh", "import.rs"),
+    ("SIMP", "simp", "simp.rs"),
     ("SMOOTHING", "smoothing", "smoothing.rs"),
     ("SMOOTHING_STUDY", "smoothing", "smoothing_study.rs"),
     ("TILING", "tiling", "tiling.rs"),

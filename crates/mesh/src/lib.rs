@@ -20,7 +20,7 @@ pub mod triangle_mesh;
 pub mod write;
 
 pub use connectivity::{Connectivity, ConnectivityError};
-pub use glam::DVec3;
+pub use glam::{DMat3, DVec3};
 pub use ids::{FaceId, HalfEdgeId, RegionId, VertexId};
 pub use part::{
     Design, FeatureEdge, FeatureKind, ImportRecord, Part, Provenance, Region, RegionShape, Repair,

@@ -3,6 +3,7 @@
 mod beams;
 mod import;
 mod quad_matching;
+mod simp;
 mod skeleton;
 mod smoothing;
 mod smoothing_study;
@@ -17,6 +18,7 @@ use topipe_engine::Registry;
 pub fn registry() -> Registry {
     Registry::new()
         .with_stage(import::Import)
+        .with_stage(simp::Simp)
         .with_stage(smoothing::Smoothing)
         .with_stage(smoothing_study::SmoothingStudy)
         .with_stage(tiling::Tiling)
@@ -60,16 +62,21 @@ mod tests {
             (Value::Array(_), _) if field.name == "non_design" => {
                 "[{ type = \"box\", min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }]".into()
             }
+            (Value::Array(_), _) if ["domain", "subtract"].contains(&field.name.as_str()) => {
+                "[{ type = \"box\", min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }]".into()
+            }
+            (Value::Array(_), _) if field.name == "symmetry" => "[\"y\"]".into(),
+            (Value::Null, _) if field.name == "average_along" => "\"y\"".into(),
             (Value::Array(_), _) if field.name == "features" => {
                 "[{ action = \"drop\", space = { type = \"non-design\" } }]".into()
             }
             (Value::Array(_), _) if field.name == "profiles" => {
                 "[{ name = \"bar\", shape = \"round\", dimensions = [7.3] }]".into()
             }
-            (Value::Array(_), _) if field.name == "supports" && kind == "stiffness" => {
+            (Value::Array(_), _) if field.name == "supports" && kind != "beams" => {
                 "[{ region = { type = \"box\", min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] } }]".into()
             }
-            (Value::Array(_), _) if field.name == "loads" && kind == "stiffness" => {
+            (Value::Array(_), _) if field.name == "loads" && kind != "beams" => {
                 "[{ region = { type = \"feature\", near = [0.0, 0.0, 0.0] }, pressure = 1.0 }]".into()
             }
             (Value::Array(_), _) if field.name == "supports" => "[{ at = [0.0, 0.0, 0.0] }]".into(),
@@ -234,6 +241,6 @@ mod tests {
         assert!(versions.iter().all(|version| version.len() == 16));
         versions.sort();
         versions.dedup();
-        assert_eq!(versions.len(), 10);
+        assert_eq!(versions.len(), 11);
     }
 }
