@@ -73,3 +73,10 @@ nothing-to-do:
     cargo build --release
     test -x target/peers/bin/dvc || (python3 -m venv target/peers && target/peers/bin/pip install -q dvc snakemake)
     target/peers/bin/python benchmarks/nothing_to_do.py target/release/topipe
+
+# 100 iterations of HC and of Taubin beside trimesh, pymeshlab and VTK, at 16k and 1.05M triangles, with the memory's bandwidth.
+smoothing-peers *options:
+    cargo build --release -p topipe-smoothing --example bench
+    test -d target/smoothing-peers || (python3 -m venv target/smoothing-peers && \
+        target/smoothing-peers/bin/pip install -q trimesh scipy pymeshlab pyvista)
+    target/smoothing-peers/bin/python crates/smoothing/benches/peers.py {{options}}

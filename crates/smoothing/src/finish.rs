@@ -7,12 +7,15 @@
 //! - *Spikes and folds*: at an edge with a dihedral angle beyond `spike_angle`, the ends of the edge that may move
 //!   freely take half umbrella steps, without the pull towards the input. Where both are held, the two faces turn apart
 //!   about the edge; where these are held too, what slid goes back. Until no such edge is left or the rounds are used up.
+//!   What is left then is searched for a better place, vertex by vertex (`relief`).
 //!   (Umbrella steps for all four vertices thin out the base of a knife edge as fast as its ridge and made more spikes
 //!   than they took.)
 //! - *Crossings*: the vertices of triangles that pass through each other, and a ring more in each round, go back half
 //!   of the way to the input, which does not pass through itself. In the end they are there; so this ends.
 //!
 //! Both keep frozen vertices, shapes of regions and the volume.
+
+mod relief;
 
 use crate::SmoothingError;
 use crate::kernel::{CHUNK, Domain, umbrella};
@@ -139,6 +142,9 @@ impl Finish<'_> {
             self.domain.project(&self.mesh.positions, &mut next);
             self.guard.hold(current, &mut next);
             std::mem::swap(current, &mut next);
+            spikes = self.spikes(current);
+        }
+        if !spikes.is_empty() && self.relieve(current, &spikes) {
             spikes = self.spikes(current);
         }
         mended.spikes_after = spikes.len();
