@@ -47,7 +47,7 @@ fn widest(radius: f64, tolerance: f64) -> f64 {
     (2.0 * (1.0 - tolerance / radius).max(0.0).acos()).clamp(1e-6, std::f64::consts::FRAC_PI_4)
 }
 
-/// How often the tolerance is made four times finer when borders cross because they are sampled too coarsely.
+/// How often the borders of a face are sampled four times more finely when they cross because they are sampled too coarsely.
 const REFINEMENTS: u32 = 4;
 
 impl SplineSurface {
@@ -55,7 +55,7 @@ impl SplineSurface {
     ///
     /// Guarantees: a closed surface gives a closed mesh, oriented alike, with shared vertices. The tolerance is an
     /// estimate from the control points; at most 256 divisions are made per patch side. Where the borders of a face
-    /// would cross each other, everything is sampled more finely; a face whose borders cross however finely they are
+    /// would cross each other, they are sampled more finely; a face whose borders cross however finely they are
     /// sampled is left out, and the mesh is open there.
     pub fn tessellate(&self, chord_tolerance: f64) -> TriangleMesh {
         self.tessellate_with(chord_tolerance, f64::INFINITY).0
@@ -75,25 +75,42 @@ impl SplineSurface {
     }
 
     fn refined(&self, chord_tolerance: f64, longest: f64, patches: bool) -> (TriangleMesh, Vec<u32>) {
-        let mut tolerance = if chord_tolerance > 0.0 { chord_tolerance } else { f64::MIN_POSITIVE };
+        let tolerance = if chord_tolerance > 0.0 { chord_tolerance } else { f64::MIN_POSITIVE };
+        // Only the borders of a face that needs it are sampled more finely: where all were, one such face made a billion
+        // bytes of the bell crank's STL.
+        let mut tolerances = vec![tolerance; self.edges.len()];
         for _ in 0..REFINEMENTS {
-            let (mesh, face_of_triangle, complete) = self.triangles(tolerance, longest, patches);
-            if complete {
+            let (mesh, face_of_triangle, crossing) = self.triangles(tolerance, &tolerances, longest, patches);
+            if crossing.is_empty() {
                 return (mesh, face_of_triangle);
             }
-            tolerance /= 4.0;
+            let mut edges: Vec<u32> = crossing
+                .iter()
+                .flat_map(|&face| self.faces[face].loops.iter().flatten().map(|side| side.edge))
+                .collect();
+            edges.sort_unstable();
+            edges.dedup();
+            edges.into_iter().for_each(|edge| tolerances[edge as usize] /= 4.0);
         }
-        let (mesh, face_of_triangle, _) = self.triangles(tolerance, longest, patches);
+        let (mesh, face_of_triangle, _) = self.triangles(tolerance, &tolerances, longest, patches);
         (mesh, face_of_triangle)
     }
 
-    fn triangles(&self, tolerance: f64, longest: f64, patches: bool) -> (TriangleMesh, Vec<u32>, bool) {
+    /// With a tolerance for each edge. Also returns the analytic faces whose borders cross.
+    fn triangles(
+        &self,
+        tolerance: f64,
+        tolerances: &[f64],
+        longest: f64,
+        patches: bool,
+    ) -> (TriangleMesh, Vec<u32>, Vec<usize>) {
         let mut mesh = TriangleMesh { positions: self.vertices.clone(), triangles: Vec::new() };
         // Points along each edge, ends included, as mesh vertices.
         let edges: Vec<Vec<VertexId>> = self
             .edges
             .iter()
-            .map(|edge| {
+            .zip(tolerances)
+            .map(|(edge, &tolerance)| {
                 let count = edge_divisions(edge, tolerance);
                 let mut points = vec![VertexId(edge.ends[0])];
                 for k in 1..count {
@@ -117,7 +134,7 @@ impl SplineSurface {
             add_patch(&mut mesh, patch, &sides, tolerance);
             face_of_triangle.resize(mesh.triangles.len(), p as u32);
         }
-        let mut complete = true;
+        let mut crossing = Vec::new();
         for (f, face) in self.faces.iter().enumerate() {
             let loops: Vec<Vec<VertexId>> = face
                 .loops
@@ -136,10 +153,12 @@ impl SplineSurface {
                 RegionShape::Plane { .. } => f64::INFINITY,
                 RegionShape::Cylinder { radius, .. } => widest(radius, tolerance),
             };
-            complete &= trimmed::add(&mut mesh, &face.shape, &loops, angle, longest);
+            if !trimmed::add(&mut mesh, &face.shape, &loops, angle, longest) {
+                crossing.push(f);
+            }
             face_of_triangle.resize(mesh.triangles.len(), (self.patches.len() + f) as u32);
         }
-        (mesh, face_of_triangle, complete)
+        (mesh, face_of_triangle, crossing)
     }
 }
 
