@@ -9,6 +9,7 @@
 
 pub mod coarsen;
 mod connectivity;
+mod curvature;
 pub mod disk_map;
 pub mod ids;
 pub mod import;

@@ -49,7 +49,7 @@ pub use report::{
     NormalJump, OriginalFigures, RepairFigures, Report, RoundFace, ShapeFigures, SkeletonFigures,
     SmoothingFigures, SurfaceFigures,
 };
-pub use skeleton::{BranchPoint, bounding_sphere, off_center};
+pub use skeleton::{BranchPoint, bounding_sphere, off_center, off_center_of_points};
 pub use summary::stiffness_summary;
 pub use surface::volume_by_quadrature;
 

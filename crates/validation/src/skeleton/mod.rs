@@ -41,7 +41,8 @@ pub(crate) fn figures(
         neighbors[b as usize].push(a as usize);
     }
 
-    let samples = branch_points(skeleton, &neighbors);
+    let samples: Vec<BranchPoint> =
+        branch_points(skeleton, &neighbors).into_iter().map(|(_, sample)| sample).collect();
     let radius = bounding_sphere(&part.mesh.positions).1;
     let clip = largest_interface_radius(part);
     progress.check()?;
@@ -74,8 +75,28 @@ pub(crate) fn figures(
     })
 }
 
+/// How far each point of a branch is from the middle of its section, mm, in the order of the points: what E_center is the
+/// mean of, before it is divided by the radius of the bounding sphere. `index` is that of the part's mesh. Nothing for a
+/// skeleton with indices out of range.
+pub fn off_center_of_points(skeleton: &Skeleton, part: &Part, index: &SurfaceIndex) -> Vec<(usize, f64)> {
+    let count = skeleton.points.len();
+    let fits = |edge: &[u32; 2]| edge[0] != edge[1] && edge.iter().all(|&p| (p as usize) < count);
+    if skeleton.kinds.len() != count || !skeleton.edges.iter().all(fits) {
+        return Vec::new();
+    }
+    let mut neighbors = vec![Vec::new(); count];
+    for &[a, b] in &skeleton.edges {
+        neighbors[a as usize].push(b as usize);
+        neighbors[b as usize].push(a as usize);
+    }
+    let (points, samples): (Vec<usize>, Vec<BranchPoint>) =
+        branch_points(skeleton, &neighbors).into_iter().unzip();
+    let off = off_center(&part.mesh, index, &samples, largest_interface_radius(part));
+    points.into_iter().zip(off).collect()
+}
+
 /// Points on branches with a neighbour on either side: their tangents are the chords between the neighbours.
-fn branch_points(skeleton: &Skeleton, neighbors: &[Vec<usize>]) -> Vec<BranchPoint> {
+fn branch_points(skeleton: &Skeleton, neighbors: &[Vec<usize>]) -> Vec<(usize, BranchPoint)> {
     let points = &skeleton.points;
     let mut samples = Vec::new();
     for (p, kind) in skeleton.kinds.iter().enumerate() {
@@ -83,7 +104,7 @@ fn branch_points(skeleton: &Skeleton, neighbors: &[Vec<usize>]) -> Vec<BranchPoi
             && let Some(tangent) = (points[b] - points[a]).try_normalize()
         {
             let length = (points[a].distance(points[p]) + points[p].distance(points[b])) / 2.0;
-            samples.push(BranchPoint { position: points[p], tangent, length });
+            samples.push((p, BranchPoint { position: points[p], tangent, length }));
         }
     }
     samples
