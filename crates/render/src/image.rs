@@ -42,6 +42,11 @@ impl Image {
         (x < self.width && y < self.height).then(|| self.pixels[y * self.width + x])
     }
 
+    /// Colours a pixel of the picture.
+    pub(crate) fn set(&mut self, x: usize, y: usize, color: Color) {
+        self.pixels[y * self.width + x] = color;
+    }
+
     /// Several pictures beside and below each other, `columns` to a row, `gap` pixels apart, each in the middle of
     /// a cell of the size of the largest.
     pub fn grid(images: &[Self], columns: usize, gap: usize, background: Color) -> Self {

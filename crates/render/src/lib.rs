@@ -29,6 +29,7 @@
 //! # Ok::<(), topipe_render::RenderError>(())
 //! ```
 
+mod annotate;
 mod camera;
 mod color;
 mod crease_normals;
@@ -39,6 +40,7 @@ mod raster;
 mod scene;
 mod shade;
 
+pub use annotate::Legend;
 pub use camera::Camera;
 pub use color::Color;
 pub use image::Image;
@@ -63,6 +65,10 @@ pub struct Options {
     pub margin: f64,
     /// What is seen where nothing is.
     pub background: Color,
+    /// A bar of known length at the lower left.
+    pub scale_bar: bool,
+    /// What the colours mean, at the lower right.
+    pub legend: Option<Legend>,
 }
 
 impl Default for Options {
@@ -75,6 +81,8 @@ impl Default for Options {
             occlusion_reach: 0.06,
             margin: 0.04,
             background: Color::WHITE,
+            scale_bar: false,
+            legend: None,
         }
     }
 }
@@ -135,7 +143,14 @@ pub fn render(scene: &Scene<'_>, camera: &Camera, options: &Options) -> Result<I
     let translucent: Vec<_> =
         translucent.into_iter().map(|layer| raster::rasterize(&[layer], &projection)).collect();
     let occlusion = (options.occlusion > 0.0).then(|| occlusion::ambient_occlusion(&solid, &projection));
-    Ok(shade::shade(&solid, &translucent, occlusion.as_deref(), &projection, options))
+    let mut image = shade::shade(&solid, &translucent, occlusion.as_deref(), &projection, options);
+    if options.scale_bar {
+        annotate::scale_bar(&mut image, &projection);
+    }
+    if let Some(legend) = &options.legend {
+        annotate::legend(&mut image, legend);
+    }
+    Ok(image)
 }
 
 /// Draws `scene` from several sides and puts the pictures beside each other, `columns` to a row.

@@ -67,6 +67,18 @@ pub fn sequential(t: f64) -> Color {
     Color::from_oklch(0.38 + 0.55 * t, chroma, hue)
 }
 
+/// A colour for a number from -1 to 1: blue below zero, light grey at zero, orange above, both ends equally dark. Blue
+/// and orange are told apart by people who see red and green alike. Not a number: grey.
+pub fn diverging(t: f64) -> Color {
+    if t.is_nan() {
+        return Color([160, 160, 160]);
+    }
+    let t = t.clamp(-1.0, 1.0);
+    let hue = if t < 0.0 { 255.0 } else { 55.0 };
+    let strength = t.abs();
+    Color::from_oklch(0.95 - 0.45 * strength, 0.15 * strength.powf(0.8), hue)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,5 +109,19 @@ mod tests {
         }
         assert_eq!(sequential(-1.0), sequential(0.0));
         assert_eq!(sequential(2.0), sequential(1.0));
+    }
+
+    #[test]
+    fn diverging_is_lightest_at_zero_and_even_to_both_sides() {
+        let luminance = |t: f64| {
+            let [r, g, b] = diverging(t).to_linear();
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        for k in 0..16 {
+            let (near, far) = (f64::from(k) / 16.0, f64::from(k + 1) / 16.0);
+            assert!(luminance(near) > luminance(far) && luminance(-near) > luminance(-far), "at {near}");
+        }
+        assert!((luminance(1.0) - luminance(-1.0)).abs() < 0.1);
+        assert_eq!(diverging(f64::NAN), Color([160, 160, 160]));
     }
 }

@@ -228,3 +228,15 @@ fn broken_input_is_refused_or_left_out() {
         assert!((covered(&image) as i64 - 80 * 80 / 2).abs() <= 80, "half of the square is left");
     }
 }
+
+#[test]
+fn a_scale_bar_is_as_long_as_it_says() {
+    // The square is 2 mm wide and fills 80 of 100 pixels: 40 pixels a millimetre, so a bar of 0.2 mm has 8.
+    let options = Options { scale_bar: true, ..plain(100) };
+    let bare = picture(&square(0.0), Camera::TOP, &plain(100));
+    let with = picture(&square(0.0), Camera::TOP, &options);
+    let row = 100 - 8 - 1;
+    let length = (0..100).filter(|&x| with.pixel(x, row) == Some(Color::LINE)).count();
+    assert_eq!(length, 8, "0.5 mm would be more than a sixth of the picture");
+    assert!(with.pixels().iter().zip(bare.pixels()).filter(|(a, b)| a != b).count() > 40);
+}
