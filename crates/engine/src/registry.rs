@@ -34,6 +34,9 @@ pub struct Exporter {
     pub ending: &'static str,
     /// Identifies the code, so that a better writer rewrites the export.
     pub code_version: String,
+    /// The file tells of the whole run: whoever started the run writes it once it is over, also where the stage gave no
+    /// result. It is no export of the run's record.
+    pub after_run: bool,
     write: Arc<WriteValue>,
 }
 
@@ -49,10 +52,22 @@ impl Exporter {
             artifact: ArtifactType::of::<K>(),
             ending,
             code_version: code_version.into(),
+            after_run: false,
             write: Arc::new(move |value, name, file| match value.downcast_ref::<K::Value>() {
                 Some(value) => write(value, name, file),
                 None => Err(ExportError::Refused(format!("the artifact is not a {}", K::NAME))),
             }),
+        }
+    }
+
+    /// Stands for a file that is written after the run, whatever the artifact.
+    fn after_run(artifact: &ArtifactType, ending: &'static str) -> Self {
+        Self {
+            artifact: *artifact,
+            ending,
+            code_version: String::new(),
+            after_run: true,
+            write: Arc::new(|_, _, _| Err(ExportError::Refused("it is written after the run".into()))),
         }
     }
 
@@ -67,6 +82,7 @@ impl Exporter {
 pub struct Registry {
     stages: Vec<Arc<dyn AnyStage>>,
     exporters: Vec<Exporter>,
+    after_run: Vec<&'static str>,
 }
 
 impl Registry {
@@ -96,6 +112,13 @@ impl Registry {
         exporters.into_iter().fold(self, Self::with_exporter)
     }
 
+    /// Takes files with this ending as written after the run, by whoever starts it, about the run as a whole.
+    #[must_use]
+    pub fn with_file_after_run(mut self, ending: &'static str) -> Self {
+        self.after_run.push(ending);
+        self
+    }
+
     /// The kinds in the order they were added.
     pub fn stages(&self) -> impl Iterator<Item = &Arc<dyn AnyStage>> {
         self.stages.iter()
@@ -112,15 +135,20 @@ impl Registry {
     }
 
     /// The writer of an artifact for an ending, which is compared without regard to case.
-    pub fn exporter(&self, artifact: &ArtifactType, ending: &str) -> Option<&Exporter> {
-        self.exporters
+    pub fn exporter(&self, artifact: &ArtifactType, ending: &str) -> Option<Exporter> {
+        let of_artifact = self
+            .exporters
             .iter()
-            .find(|exporter| exporter.artifact == *artifact && exporter.ending.eq_ignore_ascii_case(ending))
+            .find(|exporter| exporter.artifact == *artifact && exporter.ending.eq_ignore_ascii_case(ending));
+        of_artifact.cloned().or_else(|| {
+            let ending = self.after_run.iter().find(|known| known.eq_ignore_ascii_case(ending))?;
+            Some(Exporter::after_run(artifact, ending))
+        })
     }
 
     /// The writer of an artifact for a file, by the longest ending that has one: `part.ap242.step` is written by that of
     /// `ap242.step` if there is one, else by that of `step`.
-    pub fn exporter_of_file(&self, artifact: &ArtifactType, file: &str) -> Option<&Exporter> {
+    pub fn exporter_of_file(&self, artifact: &ArtifactType, file: &str) -> Option<Exporter> {
         let name = file.rsplit('/').next().unwrap_or(file);
         // A name that is nothing but an ending has none.
         let dots = name.match_indices('.').map(|(at, _)| at).filter(|&at| at > 0);
@@ -133,6 +161,7 @@ impl Registry {
             .iter()
             .filter(|exporter| exporter.artifact == *artifact)
             .map(|exporter| exporter.ending)
+            .chain(self.after_run.iter().copied())
             .collect()
     }
 }

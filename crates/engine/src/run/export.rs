@@ -48,7 +48,8 @@ pub(super) fn write_all(executor: &Executor<'_>) -> Vec<ExportRecord> {
     let before: Written = executor.cache().read_record(Bucket::Exports, &name).unwrap_or_default();
     let mut written = before.clone();
     let mut records = Vec::new();
-    for export in executor.pipeline().exports.iter().filter(|export| executor.is_selected(export.stage)) {
+    let of_stages = executor.pipeline().exports.iter().filter(|export| !export.exporter.after_run);
+    for export in of_stages.filter(|export| executor.is_selected(export.stage)) {
         if executor.interrupt.is_raised() {
             break;
         }

@@ -102,8 +102,8 @@ pub fn run(
     executor.remember();
 
     let stages = executor.into_records();
-    let expected =
-        pipeline.exports.iter().filter(|export| selection.selected.contains(&export.stage)).count();
+    let of_stages = pipeline.exports.iter().filter(|export| !export.exporter.after_run);
+    let expected = of_stages.filter(|export| selection.selected.contains(&export.stage)).count();
     let code = exit_code(interrupt, &stages, &exports, expected);
     let seconds = start.elapsed().as_secs_f64();
     let record = RunRecord {

@@ -57,7 +57,7 @@ pub(super) fn resolve(
             };
             return Err(Box::new(at_key(message).help(help)));
         };
-        resolved.push(ExportNode { file: file.to_owned(), stage, exporter: exporter.clone() });
+        resolved.push(ExportNode { file: file.to_owned(), stage, exporter });
     }
     Ok(resolved)
 }
