@@ -30,8 +30,18 @@ threads case="bracket":
     done
     cmp target/threads/1.txt target/threads/2.txt && cmp target/threads/1.txt target/threads/8.txt
 
-# Draw the pictures of the README and of pipelines/README.md anew.
-pictures: all
+# Draw the pictures of the README, of pipelines/README.md and of the guide anew.
+pictures: gallery
+    for stage in mesh smooth tiles quads surface; do \
+        target/release/topipe -q render $stage --pipeline pipelines/bracket.toml \
+            -o docs/src/pictures/$stage.png --size 720x540 || exit 1; \
+    done
+    target/release/topipe -q render surface --pipeline pipelines/bracket.toml --color deviation --against smooth --scale-bar \
+        -o docs/src/pictures/deviation.png --size 720x540
+    for stage in frame beams; do \
+        target/release/topipe -q render $stage --pipeline pipelines/cantilever.toml --over smooth \
+            -o docs/src/pictures/$([ $stage = frame ] && echo skeleton || echo beams).png --size 720x540 || exit 1; \
+    done
     for stage in mesh smooth quads surface; do \
         target/release/topipe -q render $stage --pipeline pipelines/bracket.toml \
             -o pipelines/pictures/bracket-$stage.png --size 900x680 || exit 1; \
@@ -46,6 +56,16 @@ pictures: all
             -o pipelines/pictures/$case-skeleton.png --size 720x540 || exit 1; \
         target/release/topipe -q render beams --pipeline pipelines/$case.toml --over $over \
             -o pipelines/pictures/$case-beams.png --size 720x540 || exit 1; \
+    done
+
+# The gallery of the guide: mesh, smoothed, quadrilaterals and CAD surface of the nine parts.
+gallery: all
+    mkdir -p docs/src/pictures/gallery
+    for case in bracket beam-two-holes bridge bell-crank support cantilever cantilever-four y-form monster-lite; do \
+        for stage in mesh smooth quads surface; do \
+            target/release/topipe -q render $stage --pipeline pipelines/$case.toml \
+                -o docs/src/pictures/gallery/$case-$stage.png --size 320x240 || exit 1; \
+        done; \
     done
 
 # Open all nine STEP files in OpenCASCADE and gmsh, at four mesh sizes. Needs the packages of tests/clients.

@@ -1,4 +1,4 @@
-//! The results as their users see them: opened with OpenCASCADE, gmsh and trimesh.
+//! The results as their users see them: opened with OpenCASCADE, gmsh, trimesh, PyVista and a browser.
 //!
 //! The checkers in `tests/clients/` run in a virtual environment that this test makes itself under `target/clients`.
 //! Where it can not be made, the tests print SKIPPED and the reason; with TOPIPE_REQUIRE_CLIENTS=1 they fail.
@@ -39,7 +39,7 @@ fn run(command: &mut Command) -> Result<String, String> {
 }
 
 fn import_packages(python: &Path) -> Result<(), String> {
-    let imports = "import OCP.STEPControl, gmsh, trimesh, scipy, rtree, networkx";
+    let imports = "import OCP.STEPControl, gmsh, trimesh, scipy, rtree, networkx, pyvista, playwright, PIL";
     run(Command::new(python).args(["-c", imports])).map(|_| ())
 }
 
@@ -112,6 +112,11 @@ fn close(what: &str, value: f64, expected: f64, tolerance: f64) {
 /// Runs the whole pipeline on a fixture. The folder holds part.stl, smooth.stl, smooth.off, part.step, report.json
 /// and, where wanted, skeleton.json.
 fn run_pipeline(case: &str, skeleton: bool) -> tempfile::TempDir {
+    run_pipeline_with(case, skeleton, "")
+}
+
+/// The same with more lines in `[export]`.
+fn run_pipeline_with(case: &str, skeleton: bool, exports: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let fixture = root().join("fixtures").join(case).canonicalize().unwrap();
     // A JSON string is a TOML string.
@@ -135,6 +140,7 @@ fn run_pipeline(case: &str, skeleton: bool) -> tempfile::TempDir {
     if skeleton {
         spec += "\"skeleton.json\" = \"frame\"\n";
     }
+    spec += exports;
     let file = folder.path().join("pipeline.toml");
     fs::write(&file, spec).unwrap();
     run(Command::new(env!("CARGO_BIN_EXE_topipe"))
@@ -265,4 +271,75 @@ fn the_skeleton_measures_the_same_with_both_rulers() {
         close(name, ours / theirs, 1.0, 0.02);
     }
     assert_eq!(number(ours, "/out_of_object"), 0.0);
+}
+
+#[test]
+fn the_report_opens_in_a_browser() {
+    let Some(python) = clients() else { return };
+    let folder = run_pipeline_with("y-form", true, "\"report.html\" = \"check\"\n");
+    let found = check(python, "check_report.py", &["report.html"], folder.path());
+    println!("{found:#}");
+    assert_eq!(found["viewer"], "ready");
+    assert_eq!(found["messages"], Value::Array(vec![]), "messages in the console");
+    assert_eq!(found["requests"], Value::Array(vec![]), "requests");
+    assert_eq!(found["nameless"], Value::Array(vec![]), "controls without a name");
+    assert!(number(&found, "/contrast/ratio") >= 4.5, "contrast of {}", found["contrast"]);
+    // The part is thin, but it is there, and every layer shows something of its own.
+    assert!(number(&found, "/model_share") > 0.05);
+    let layers = found["layers"].as_object().unwrap();
+    for layer in
+        ["surface", "original", "smoothed", "tiles", "quads", "patch-edges", "control-net", "skeleton"]
+    {
+        assert!(layers.contains_key(layer), "no layer {layer}");
+    }
+    for (layer, share) in layers {
+        assert!(share.as_f64().unwrap() > 1e-3, "layer {layer} shows nothing");
+    }
+    for (preset, share) in found["presets"].as_object().unwrap() {
+        assert!(share.as_f64().unwrap() > 0.02, "{preset} shows nothing");
+    }
+    assert!(number(&found, "/cut_share") > 0.02, "the section plane takes something away");
+    assert!(number(&found, "/cut_moved_share") > 1e-3, "and moves");
+    assert!(number(&found, "/cut_undone_share") < 1e-3);
+    assert!(number(&found, "/turned_share") > 0.02, "arrow keys turn the model");
+    // But for the outline around what has the focus.
+    assert!(number(&found, "/back_share") < 0.02, "key 1 is the first view");
+    assert!(number(&found, "/zoomed_share") > 0.02);
+    assert_eq!(found["marker"], 1, "a place is marked");
+    assert!(found["tip"].as_str().unwrap().contains("mm"), "what is under the pointer is told");
+}
+
+#[test]
+fn vtk_gltf_3mf_and_decks_open_in_other_programs() {
+    let Some(python) = clients() else { return };
+    let folder = run_pipeline_with(
+        "cantilever",
+        false,
+        "\"smooth.vtp\" = \"smooth\"\n\"smooth.vtk\" = \"smooth\"\n\"smooth.glb\" = \"smooth\"\n\"smooth.3mf\" = \"smooth\"\n\
+         \"smooth.inp\" = \"smooth\"\n\"tiles.vtp\" = \"tiles\"\n\"quads.vtp\" = \"quads\"\n\"surface.glb\" = \"surface\"\n",
+    );
+    let found = check(
+        python,
+        "check_formats.py",
+        &["smooth", "tiles.vtp", "quads.vtp", "surface.glb"],
+        folder.path(),
+    );
+    println!("{found:#}");
+    let report = report(folder.path());
+    let (triangles, volume) =
+        (number(&report, "/original/triangles"), number(&report, "/smoothing/volume_mm3"));
+    for file in ["smooth.vtp", "smooth.vtk", "smooth.glb", "smooth.3mf", "smooth.inp"] {
+        let of = |what: &str| number(&found[file], what);
+        close(file, of("/triangles"), triangles, 0.0);
+        // glTF has f32 and metres.
+        close(file, of("/volume_mm3") / volume, 1.0, 1e-5);
+    }
+    for file in ["smooth.vtp", "smooth.vtk"] {
+        assert_eq!(number(&found[file], "/frozen"), number(&report, "/smoothing/frozen_vertices"));
+        assert!(number(&found[file], "/regions") > 0.0);
+    }
+    assert_eq!(found["smooth.inp"]["frozen"], found["smooth.vtp"]["frozen"]);
+    assert_eq!(number(&found["tiles.vtp"], "/tile"), number(&report, "/layout/tiles"));
+    assert_eq!(number(&found["quads.vtp"], "/quad"), number(&report, "/layout/quads"));
+    close("surface", number(&found["surface.glb"], "/volume_mm3") / volume, 1.0, 0.01);
 }

@@ -377,10 +377,181 @@ fn a_new_pipeline_is_a_good_one() {
     let shop = Workshop::new();
     let ended = shop.topipe(&["new", "box.off", "-o", "fresh.toml"]);
     assert_eq!(ended.code, 0, "{}", ended.stderr);
+    for seen in [
+        "432 triangles, 3.0000 x 2.0000 x 1.0000",
+        "closed, 1 component, genus 0",
+        "unit mm",
+        "not smoothed: all 218 vertices are frozen",
+        "bulky",
+    ] {
+        assert!(
+            ended.stdout.contains(seen) && shop.read("fresh.toml").contains(seen),
+            "{seen}\n{}",
+            ended.stdout
+        );
+    }
     assert_eq!(shop.topipe(&["plan", "fresh.toml"]).code, 0);
     let again = shop.topipe(&["new", "box.off", "-o", "fresh.toml"]);
     assert_eq!(again.code, 2);
     assert!(again.stderr.contains("exists"), "{}", again.stderr);
+    // And it runs to the end, with a report to open.
+    let run = shop.topipe(&["run", "fresh.toml"]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    assert!(shop.read("topipe-out/box/box.step").starts_with("ISO-10303-21"));
+    assert!(shop.read("topipe-out/box/report.html").starts_with("<!DOCTYPE html>"));
+}
+
+#[test]
+fn a_new_pipeline_takes_labels_and_a_unit_that_fits() {
+    let shop = Workshop::new();
+    // In metres, a twentieth of a metre long, with labels beside it.
+    let text = shop.read("box.off");
+    let small = text.lines().enumerate().map(|(k, line)| match k {
+        2..=219 => line
+            .split(' ')
+            .map(|x| format!("{:?}", x.parse::<f64>().unwrap() / 60.0))
+            .collect::<Vec<_>>()
+            .join(" "),
+        _ => line.to_owned(),
+    });
+    shop.write("small part.off", &small.collect::<Vec<_>>().join("\n"));
+    shop.write("small part.labels.csv", &"0\n".repeat(432));
+    let ended = shop.topipe(&["new", "small part.off"]);
+    assert_eq!(ended.code, 0, "{}", ended.stderr);
+    let text = shop.read("small-part.toml");
+    assert!(text.contains("units = \"m\"") && text.contains("labels = \"small part.labels.csv\""), "{text}");
+    assert_eq!(shop.topipe(&["plan", "small-part.toml"]).code, 0);
+}
+
+/// The pipeline with a report of its run.
+fn with_report() -> Workshop {
+    let shop = Workshop::new();
+    shop.edit("\"report.json\" = \"check\"", "\"report.json\" = \"check\"\n\"report.html\" = \"check\"");
+    shop
+}
+
+#[test]
+fn the_report_is_written_when_what_it_shows_has_changed() {
+    let shop = with_report();
+    let ended = shop.topipe(&["run", "box.toml"]);
+    assert_eq!(ended.code, 0, "{}", ended.stderr);
+    assert!(ended.stdout.contains("report.html  written; open it"), "{}", ended.stdout);
+    let page = shop.read("topipe-out/box/report.html");
+    for part in [
+        "<title>box",
+        "Volume of the smoothed mesh",
+        "id=\"scene\"",
+        "smooth",
+        "CAD surface: not in this report",
+    ] {
+        assert!(page.contains(part), "no {part}");
+    }
+    // It is no export of the run: the record of a run cannot hold a file that shows the record.
+    assert!(!shop.read("topipe-out/box/run.json").contains("report.html"));
+    assert_eq!(shop.events(&[]), NOTHING);
+    assert_eq!(
+        shop.read("topipe-out/box/report.html"),
+        page,
+        "the times in it are still those of the first run"
+    );
+    shop.write("topipe-out/box/report.html", &page[..page.len() / 2]);
+    shop.events(&[]);
+    assert!(shop.read("topipe-out/box/report.html").ends_with("</html>"));
+    shop.edit("method = \"taubin\"", "method = \"taubin\"\nlambda = 0.5");
+    shop.events(&[]);
+    assert_ne!(shop.read("topipe-out/box/report.html"), page);
+    // And by hand, from the record.
+    let by_hand = shop.topipe(&["report", "topipe-out/box", "-o", "mail/box.html"]);
+    assert_eq!(by_hand.code, 0, "{}", by_hand.stderr);
+    assert!(shop.read("mail/box.html").contains("<title>box"));
+    assert_eq!(shop.topipe(&["report", "nowhere"]).code, 2);
+}
+
+#[test]
+fn a_run_that_failed_has_a_report_of_what_there_is() {
+    let shop = with_report();
+    shop.events(&[]);
+    // The mesh is known; smoothing is told to hold a hole where there is none.
+    shop.edit("detect_planes = false", "features = [{ action = \"pin\", space = { type = \"box\", min = [90.0, 90.0, 90.0], max = [91.0, 91.0, 91.0] } }]");
+    let ended = shop.topipe(&["run", "box.toml"]);
+    assert_eq!(ended.code, 3, "{}", ended.stderr);
+    let page = shop.read("topipe-out/box/report.html");
+    for part in
+        ["The run did not finish", "Stage smooth failed", "skipped", "The report of stage check is missing"]
+    {
+        assert!(page.contains(part), "no {part}");
+    }
+    // Of the mesh there is a picture all the same.
+    assert!(page.contains("\"id\":\"original\""));
+}
+
+#[test]
+fn each_variant_of_a_sweep_has_its_report() {
+    let shop = with_report();
+    shop.write(
+        "box.toml",
+        &(shop.read("box.toml") + "\n[sweep]\ngrid = { \"smooth.iterations\" = [2, 4] }\n"),
+    );
+    let ended = shop.topipe(&["run", "box.toml"]);
+    assert_eq!(ended.code, 0, "{}", ended.stderr);
+    let mut pages: Vec<String> = Vec::new();
+    for file in files_below(&shop.path("topipe-out/box")) {
+        if file.ends_with("report.html") {
+            pages.push(std::fs::read_to_string(file).unwrap());
+        }
+    }
+    assert_eq!(pages.len(), 2);
+    // Three stages in each, though the run has five.
+    assert!(pages.iter().all(|page| page.matches("class=\"state computed\"").count() == 3));
+}
+
+#[test]
+fn meshes_are_written_in_all_formats_with_the_same_bytes() {
+    let endings = ["glb", "3mf", "vtp", "vtk", "inp"];
+    let write = || {
+        let shop = Workshop::new();
+        let exports: Vec<String> = endings.iter().map(|e| format!("\"smooth.{e}\" = \"smooth\"")).collect();
+        shop.edit("\"smooth.ply\" = \"smooth\"", &exports.join("\n"));
+        let ended = shop.topipe(&["run", "box.toml"]);
+        assert_eq!(ended.code, 0, "{}", ended.stderr);
+        endings.map(|ending| std::fs::read(shop.path(&format!("topipe-out/box/smooth.{ending}"))).unwrap())
+    };
+    let files = write();
+    let starts: [&[u8]; 5] = [b"glTF", b"PK\x03\x04", b"<?xml", b"# vtk", b"*HEADING"];
+    for ((file, start), ending) in files.iter().zip(starts).zip(endings) {
+        assert!(file.starts_with(start), "{ending}");
+    }
+    assert_eq!(files, write());
+}
+
+#[test]
+fn manual_pages_completions_and_examples() {
+    let shop = Workshop::new();
+    let page = shop.topipe(&["man"]).stdout;
+    assert!(page.contains(".TH topipe 1") && page.contains("topipe\\-run"), "{page}");
+    let written = shop.topipe(&["man", "--output", "man1"]);
+    assert_eq!(written.code, 0, "{}", written.stderr);
+    let help = shop.topipe(&["--help"]).stdout;
+    assert!(help.contains("Examples:") && help.contains("Exit codes:"), "{help}");
+    for command in ["run", "new", "report", "render", "cache", "completions"] {
+        assert!(shop.read(&format!("man1/topipe-{command}.1")).contains(".SH SYNOPSIS"), "{command}");
+    }
+    assert!(shop.topipe(&["run", "--help"]).stdout.contains("Examples:"));
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = shop.topipe(&["completions", shell]);
+        assert!(script.code == 0 && script.stdout.contains("topipe"), "{shell}");
+    }
+}
+
+#[test]
+fn what_is_piped_has_no_colors() {
+    let shop = Workshop::new();
+    for arguments in
+        [&["run", "box.toml"][..], &["run", "box.toml", "-v"], &["plan", "box.toml"], &["run", "none.toml"]]
+    {
+        let ended = shop.topipe(arguments);
+        assert!(!ended.stdout.contains('\x1b') && !ended.stderr.contains('\x1b'), "{arguments:?}");
+    }
 }
 
 #[test]
@@ -423,6 +594,34 @@ fn results_and_meshes_can_be_drawn() {
         assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
         assert_eq!(png[16..20], u32::to_be_bytes(width));
     }
+    // Colours by number, with a legend and a bar of known length, the same each time.
+    let deviation = [
+        "render",
+        "smooth",
+        "--pipeline",
+        "box.toml",
+        "--color",
+        "deviation",
+        "--against",
+        "mesh",
+        "--scale-bar",
+        "--edges",
+        "--size",
+        "200x150",
+        "-o",
+    ];
+    for name in ["one.png", "two.png"] {
+        let drawn = shop.topipe(&[&deviation[..], &[name]].concat());
+        assert_eq!(drawn.code, 0, "{}", drawn.stderr);
+    }
+    assert_eq!(std::fs::read(shop.path("one.png")).unwrap(), std::fs::read(shop.path("two.png")).unwrap());
+    for color in ["plain", "regions", "design", "kinds", "curvature"] {
+        let drawn =
+            shop.topipe(&["render", "box.off", "--color", color, "--size", "60x40", "-o", "color.png"]);
+        assert_eq!(drawn.code, 0, "{color}: {}", drawn.stderr);
+    }
+    assert_eq!(shop.topipe(&["render", "box.off", "-o", "x.png", "--color", "deviation"]).code, 2);
+    assert_eq!(shop.topipe(&["render", "box.off", "-o", "x.png", "--color", "pink"]).code, 2);
     assert_eq!(shop.topipe(&["render", "box.off", "-o", "x.png", "--view", "inside"]).code, 2);
     assert_eq!(shop.topipe(&["render", "box.off", "-o", "x.png", "--size", "0x0"]).code, 2);
 }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// Stage, its crate, and the file of its adapter in `stages` and of its writers in `export`. Pictures are no stage, they
 /// have a writer only.
-const PARTS: [(&str, &str, &str); 12] = [
+const PARTS: [(&str, &str, &str); 14] = [
     ("IMPORT", "mesh", "import.rs"),
     ("SIMP", "simp", "simp.rs"),
     ("SMOOTHING", "smoothing", "smoothing.rs"),
@@ -23,6 +23,8 @@ const PARTS: [(&str, &str, &str); 12] = [
     ("STIFFNESS", "stiffness", "stiffness.rs"),
     ("VALIDATION", "validation", "validation.rs"),
     ("PICTURE", "render", "picture.rs"),
+    ("EXCHANGE", "exchange", "exchange.rs"),
+    ("REPORT", "report", "report.rs"),
 ];
 
 fn main() {
@@ -31,6 +33,9 @@ fn main() {
     println!("cargo::rerun-if-changed=src/stages");
     println!("cargo::rerun-if-changed=src/export");
     println!("cargo::rerun-if-changed=src/picture.rs");
+    println!("cargo::rerun-if-changed=src/fields.rs");
+    println!("cargo::rerun-if-changed=src/report");
+    println!("cargo::rerun-if-changed=../report/assets");
     for (part, name, adapter) in PARTS {
         let mut hasher = blake3::Hasher::new();
         for name in closure(&crates, name) {
@@ -47,6 +52,16 @@ fn main() {
         hash_source(&mut writer, adapter, &here.join("src/export").join(adapter));
         if part == "PICTURE" {
             hash_source(&mut writer, adapter, &here.join("src").join(adapter));
+        }
+        if part == "REPORT" {
+            let assets = std::fs::read_dir(crates.join("report/assets")).into_iter().flatten().flatten();
+            let mut files: Vec<PathBuf> = assets.map(|entry| entry.path()).collect();
+            files.extend(sources(&here.join("src/report")));
+            files.push(here.join("src/fields.rs"));
+            files.sort();
+            for file in files {
+                hash_source(&mut writer, &file.file_name().unwrap_or_default().to_string_lossy(), &file);
+            }
         }
         hash_source(&mut hasher, adapter, &here.join("src/stages").join(adapter));
         println!("cargo::rustc-env=TOPIPE_CODE_{part}={}", &hasher.finalize().to_hex()[..16]);

@@ -9,7 +9,14 @@ use topipe_engine::{Choice, Override, RunOptions};
 #[derive(Debug, Parser)]
 #[command(
     version,
-    after_help = "Exit codes: 0 done; 1 a stage failed; 2 bad command line or pipeline; 3 geometry or data refused; \
+    after_help = "Examples:
+  topipe new part.stl                                look at a mesh, write part.toml
+  topipe run part.toml                               results in topipe-out/part/, report.html among them
+  topipe plan part.toml --set tiles.tile_size=3      what another value would cost
+  topipe stages tiling                               the fields of a stage
+  topipe render surface --pipeline part.toml -o part.png
+
+Exit codes: 0 done; 1 a stage failed; 2 bad command line or pipeline; 3 geometry or data refused; \
                   4 trouble with the cache or a file; 130 interrupted (what was finished stays finished)."
 )]
 pub struct Arguments {
@@ -50,10 +57,17 @@ impl Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run a pipeline; what is known already is not computed again.
+    #[command(
+        after_help = "Examples:\n  topipe run part.toml\n  topipe run part.toml --until smooth --force smooth\n  topipe run part.toml --set smooth.iterations=20 --out trial\n  topipe run part.toml --json > events.jsonl"
+    )]
     Run(RunArguments),
     /// Say what a run would do, and why.
+    #[command(
+        after_help = "Examples:\n  topipe plan part.toml\n  topipe plan part.toml --set smooth.method=taubin"
+    )]
     Plan(PlanArguments),
     /// Print the graph of a pipeline.
+    #[command(after_help = "Examples:\n  topipe graph part.toml --format svg > part.svg")]
     Graph(GraphArguments),
     /// List the kinds of stages, or the fields of one kind.
     Stages {
@@ -63,22 +77,47 @@ pub enum Command {
     /// Print the JSON schema of pipelines, for editors.
     Schema,
     /// Say what is in a mesh file, an artifact file, or the result of a stage.
+    #[command(
+        after_help = "Examples:\n  topipe inspect part.stl\n  topipe inspect smooth --pipeline part.toml"
+    )]
     Inspect(InspectArguments),
     /// Draw a mesh file, an artifact file, or the result of a stage as PNG.
+    #[command(
+        after_help = "Examples:\n  topipe render part.stl -o part.png\n  topipe render surface --pipeline part.toml --color deviation --against smooth -o deviation.png\n  topipe render frame --pipeline part.toml --over smooth --view 30:20 -o frame.png"
+    )]
     Render(RenderArguments),
+    /// Write the report of a run as one HTML file: model, figures, histograms, stages.
+    #[command(
+        after_help = "Examples:\n  topipe report topipe-out/part\n  topipe report topipe-out/part/run.json -o part.html"
+    )]
+    Report(ReportArguments),
     /// Do a recorded run once more, from nothing, and say whether it gives the same.
     Reproduce(ReproduceArguments),
     /// Write the hashes of a run to a file that can be kept beside a paper; `reproduce` takes it too.
     Lock(LockArguments),
     /// Say what differs between two runs: parameters, inputs, code, results.
+    #[command(after_help = "Examples:\n  topipe diff topipe-out/part trial")]
     Diff(DiffArguments),
     /// Say again what the stages of a pipeline said when their results were computed.
     Log(LogArguments),
     /// Look at the cache, or throw away what is needed least.
     Cache(CacheArguments),
     /// Write a commented pipeline for a mesh.
+    #[command(
+        after_help = "Examples:\n  topipe new part.stl\n  topipe new meshes/part.stl -o part.toml --overwrite"
+    )]
     New(NewArguments),
+    /// Print the manual page, or write one for each command.
+    #[command(
+        after_help = "Examples:\n  topipe man | man -l -\n  topipe man --output ~/.local/share/man/man1"
+    )]
+    Man(ManArguments),
     /// Print a completion script.
+    #[command(
+        after_help = "Examples:\n  topipe completions bash > ~/.local/share/bash-completion/completions/topipe\n  \
+                            topipe completions zsh > ~/.zfunc/_topipe\n  \
+                            topipe completions fish > ~/.config/fish/completions/topipe.fish"
+    )]
     Completions {
         /// The shell.
         shell: clap_complete::Shell,
@@ -234,6 +273,25 @@ pub struct RenderArguments {
     /// The picture.
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// What the colours say: plain, regions, design, tiles, quads, patches, kinds, curvature, or deviation (from --against)
+    /// [default: what suits the result].
+    #[arg(long)]
+    pub color: Option<String>,
+    /// The mesh that deviations are measured from: a mesh file, or with --pipeline the name of a stage.
+    #[arg(long, value_name = "TARGET", required_if_eq("color", "deviation"))]
+    pub against: Option<String>,
+    /// The value at which the colours of deviation or curvature end, mm or 1/mm [default: 98 % of the surface are below].
+    #[arg(long, value_name = "VALUE")]
+    pub range: Option<f64>,
+    /// Draw the edges of the triangles.
+    #[arg(long)]
+    pub edges: bool,
+    /// Draw a bar of known length.
+    #[arg(long)]
+    pub scale_bar: bool,
+    /// Strength of the shadows in corners, 0 to 1.
+    #[arg(long, value_name = "SHARE", default_value = "0.9")]
+    pub occlusion: f32,
     /// From where: iso, front, back, left, right, top, bottom, or AZIMUTH:ELEVATION in degrees.
     #[arg(long, default_value = "iso", allow_hyphen_values = true)]
     pub view: String,
@@ -341,6 +399,19 @@ pub struct DiffArguments {
     pub json: bool,
 }
 
+/// `topipe report`.
+#[derive(Debug, Args)]
+pub struct ReportArguments {
+    /// The run: its run.json, its output folder, or the beginning of its name in `cache ls --runs`.
+    pub run: String,
+    /// The file [default: report.html beside run.json, or here].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// The cache that has the results [default: .topipe beside the pipeline of the run].
+    #[arg(long, env = "TOPIPE_CACHE", value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+}
+
 /// `topipe reproduce`.
 #[derive(Debug, Args)]
 pub struct ReproduceArguments {
@@ -372,6 +443,14 @@ pub struct LogArguments {
     pub pipeline: PipelineArguments,
     /// Only this stage.
     pub stage: Option<String>,
+}
+
+/// `topipe man`.
+#[derive(Debug, Args)]
+pub struct ManArguments {
+    /// The folder for the pages [default: the page of topipe goes to stdout].
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
 }
 
 /// `topipe new`.

@@ -15,6 +15,27 @@ pub(crate) fn colors_on_stderr() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
+/// Whether stdout is a terminal on which colors are welcome.
+fn colors_on_stdout() -> bool {
+    std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
+
+/// The styles of a summary: all empty where colors are not welcome.
+#[derive(Clone, Copy)]
+struct Style {
+    bold: &'static str,
+    dim: &'static str,
+    good: &'static str,
+    bad: &'static str,
+    end: &'static str,
+}
+
+impl Style {
+    const NONE: Self = Self { bold: "", dim: "", good: "", bad: "", end: "" };
+    const ANSI: Self =
+        Self { bold: "\x1b[1m", dim: "\x1b[2m", good: "\x1b[32m", bad: "\x1b[31m", end: "\x1b[0m" };
+}
+
 /// "1.2 s", "340 ms".
 pub(crate) fn duration(seconds: f64) -> String {
     match seconds {
@@ -54,6 +75,12 @@ pub(crate) struct Console {
     running: Mutex<HashMap<String, ProgressBar>>,
     /// How many stages are done, where there are many.
     whole: Mutex<Option<ProgressBar>>,
+}
+
+/// How much longer something takes that goes on as it went: told once there is something to go by.
+fn remaining(elapsed: Duration, done: u64, total: u64) -> Option<Duration> {
+    let known = elapsed >= Duration::from_secs(2) && done > 0 && total > done;
+    known.then(|| elapsed.mul_f64((total - done) as f64 / done as f64))
 }
 
 /// So many stages can be followed one by one.
@@ -128,7 +155,9 @@ impl EventSink for Console {
             Event::StageProgress { stage, done, total, what } => {
                 if let Some(bar) = self.running.lock().unwrap_or_else(PoisonError::into_inner).get(stage) {
                     let of = if *total > 0 { format!(" of {total}") } else { String::new() };
-                    bar.set_message(format!("{done}{of} {what}"));
+                    let left = remaining(bar.elapsed(), *done, *total);
+                    let left = left.map_or_else(String::new, |left| format!(", about {} left", span(left)));
+                    bar.set_message(format!("{done}{of} {what}{left}"));
                 }
             }
             Event::StageWaiting { stage, holder } => {
@@ -193,35 +222,72 @@ impl EventSink for JsonLines {
     }
 }
 
-/// What a run did, for the terminal.
-pub(crate) fn summary(record: &RunRecord, out: &Path, figures: &[(String, String)]) -> String {
-    let mut text = format!("{} ({})\n", record.pipeline, duration(record.seconds));
+/// What a run did, for the terminal. `reports` are files written after the run; `broken` are figures out of their limits,
+/// or nothing where there are no figures.
+pub(crate) fn summary(
+    record: &RunRecord,
+    out: &Path,
+    figures: &[(String, String)],
+    reports: &[std::path::PathBuf],
+    broken: Option<&[topipe_report::figures::Finding]>,
+) -> String {
+    let style = if colors_on_stdout() { Style::ANSI } else { Style::NONE };
+    styled_summary(record, out, figures, reports, broken, style)
+}
+
+fn styled_summary(
+    record: &RunRecord,
+    out: &Path,
+    figures: &[(String, String)],
+    reports: &[std::path::PathBuf],
+    broken: Option<&[topipe_report::figures::Finding]>,
+    style: Style,
+) -> String {
+    let Style { bold, dim, good, bad, end } = style;
+    let mut text = format!("{bold}{}{end} ({})\n", record.pipeline, duration(record.seconds));
     let names = record.stages.iter().map(|stage| stage.stage.chars().count()).max().unwrap_or(0);
     let kinds = record.stages.iter().map(|stage| stage.kind.len()).max().unwrap_or(0);
     for stage in &record.stages {
         let state = match &stage.outcome {
             Outcome::Computed => duration(stage.seconds.unwrap_or_default()),
-            Outcome::Cached => "cached".into(),
-            Outcome::Failed { .. } => "failed".into(),
-            Outcome::Skipped { because } => format!("skipped: {because}"),
+            Outcome::Cached => format!("{dim}cached{end}"),
+            Outcome::Failed { .. } => format!("{bad}failed{end}"),
+            Outcome::Skipped { because } => format!("{dim}skipped: {because}{end}"),
         };
         let _ = writeln!(text, "  {:names$}  {:kinds$}  {state}", stage.stage, stage.kind);
     }
-    if !record.exports.is_empty() {
-        let _ = writeln!(text, "\n{}", out.display());
+    if !record.exports.is_empty() || !reports.is_empty() {
+        let _ = writeln!(text, "\n{bold}{}{end}", out.display());
         let files = record.exports.iter().map(|export| export.file.chars().count()).max().unwrap_or(0);
         for export in &record.exports {
             let state = match &export.outcome {
                 ExportOutcome::Written => format!("written, {}", size(export.bytes.unwrap_or_default())),
-                ExportOutcome::UpToDate => "up to date".into(),
+                ExportOutcome::UpToDate => format!("{dim}up to date{end}"),
                 ExportOutcome::Skipped => "not written: its stage gave no result".into(),
-                ExportOutcome::Failed { .. } => "failed".into(),
+                ExportOutcome::Failed { .. } => format!("{bad}failed{end}"),
             };
             let _ = writeln!(text, "  {:files$}  {state}", export.file);
         }
+        for report in reports {
+            let _ = writeln!(text, "  {:files$}  written; open it in a browser", report.display());
+        }
     }
     for (stage, figures) in figures {
-        let _ = writeln!(text, "\n{stage}\n{}", figures.trim_end());
+        let _ = writeln!(text, "\n{bold}{stage}{end}\n{}", figures.trim_end());
+    }
+    match broken {
+        Some([]) => {
+            let _ = writeln!(text, "\n{good}all figures are within their limits{end}");
+        }
+        Some(broken) => {
+            let plural = if broken.len() == 1 { "figure is" } else { "figures are" };
+            let _ = writeln!(text, "\n{bad}{} {plural} out of limits{end}", broken.len());
+            for finding in broken {
+                let limit = finding.limit.as_deref().unwrap_or_default();
+                let _ = writeln!(text, "  {}: {} (limit: {limit})", finding.words, finding.value);
+            }
+        }
+        None => {}
     }
     text
 }
@@ -238,5 +304,14 @@ mod tests {
         assert_eq!(duration(125.0), "2 min 5 s");
         assert_eq!(size(999), "999 B");
         assert_eq!(size(1_234_567), "1.2 MB");
+    }
+
+    #[test]
+    fn what_is_left_is_told_once_it_can_be_known() {
+        let s = Duration::from_secs;
+        assert_eq!(remaining(s(1), 5, 10), None);
+        assert_eq!(remaining(s(10), 0, 10), None);
+        assert_eq!(remaining(s(10), 10, 10), None);
+        assert_eq!(remaining(s(10), 2, 10), Some(s(40)));
     }
 }

@@ -6,13 +6,16 @@
 pub mod args;
 pub mod artifacts;
 mod commands;
+mod diagram;
 mod display;
 mod export;
 mod failure;
+mod fields;
 #[cfg(feature = "s3")]
 mod object_store;
 mod picture;
 mod remote;
+mod report;
 pub mod stages;
 
 use args::{Arguments, Command};
@@ -54,12 +57,14 @@ fn run(arguments: &Arguments) -> Result<topipe_engine::ExitCode, failure::Failur
         Command::Schema => commands::schema::run(),
         Command::Inspect(inspect) => commands::inspect::run(inspect),
         Command::Render(render) => commands::render::run(render),
+        Command::Report(report) => commands::report::run(report),
         Command::Reproduce(reproduce) => commands::reproduce::run(reproduce, verbosity),
         Command::Lock(lock) => commands::reproduce::write_lock(lock),
         Command::Diff(diff) => commands::diff::run(diff),
         Command::Log(log) => commands::log::run(log),
         Command::Cache(cache) => commands::cache::run(cache),
         Command::New(new) => commands::new::run(new),
+        Command::Man(man) => commands::man::run(man),
         Command::Completions { shell } => commands::completions::run(*shell),
     }
 }

@@ -11,7 +11,7 @@ pub(crate) fn run(arguments: &GraphArguments) -> Result<ExitCode, Failure> {
     super::print(&match arguments.format {
         GraphFormat::Mermaid => mermaid(&pipeline),
         GraphFormat::Dot => dot(&pipeline),
-        GraphFormat::Svg => super::graph_svg::svg(&pipeline),
+        GraphFormat::Svg => crate::diagram::of_pipeline(&pipeline),
     })
 }
 

@@ -3,7 +3,7 @@
 use crate::args::{RenderArguments, TargetArguments};
 use crate::artifacts::{Beams, Mesh, QuadLayout, Skeleton, SplineSurface, Tiling};
 use crate::failure::Failure;
-use crate::picture::{self, View};
+use crate::picture::{self, Paint, View};
 use topipe_engine::cache::write_atomically;
 use topipe_engine::{ArtifactKind, ExitCode, codec};
 use topipe_render::{Camera, Image, Options};
@@ -63,12 +63,46 @@ fn view(arguments: &RenderArguments) -> Result<View, Failure> {
     let (width, height) = size.ok_or_else(|| {
         Failure::new(ExitCode::Usage, format!("`{}` is not a size; use WIDTHxHEIGHT", arguments.size))
     })?;
-    let over = arguments.over.as_ref().map(|target| over(arguments, target)).transpose()?;
-    Ok(View { camera, options: Options { width, height, ..Options::default() }, over })
+    let over = arguments.over.as_ref().map(|target| mesh_of("--over", arguments, target)).transpose()?;
+    let options = Options {
+        width,
+        height,
+        scale_bar: arguments.scale_bar,
+        occlusion: arguments.occlusion.clamp(0.0, 1.0),
+        ..Options::default()
+    };
+    let range = arguments.range.filter(|range| *range > 0.0 && range.is_finite());
+    if range.is_none() && arguments.range.is_some() {
+        return Err(Failure::new(ExitCode::Usage, "--range must be above 0"));
+    }
+    Ok(View { camera, options, over, paint: paint(arguments)?, range, edges: arguments.edges })
 }
 
-/// The mesh of `--over`: a file or a stage.
-fn over(arguments: &RenderArguments, target: &str) -> Result<topipe_mesh::Part, Failure> {
+/// What `--color` asks for.
+fn paint(arguments: &RenderArguments) -> Result<Paint, Failure> {
+    Ok(match arguments.color.as_deref() {
+        None => Paint::Usual,
+        Some("plain") => Paint::Plain,
+        Some("regions") => Paint::Regions,
+        Some("design") => Paint::Design,
+        Some("tiles" | "quads" | "patches") => Paint::Ids,
+        Some("kinds") => Paint::Kinds,
+        Some("curvature") => Paint::Curvature,
+        Some("deviation") => {
+            let target = arguments.against.as_deref().unwrap_or_default();
+            Paint::Deviation(Box::new(mesh_of("--against", arguments, target)?.mesh))
+        }
+        Some(other) => {
+            let message = format!(
+                "there is no colouring `{other}`; use plain, regions, design, tiles, quads, patches, kinds, curvature or deviation"
+            );
+            return Err(Failure::new(ExitCode::Usage, message));
+        }
+    })
+}
+
+/// The mesh of an option: a file or a stage.
+fn mesh_of(option: &str, arguments: &RenderArguments, target: &str) -> Result<topipe_mesh::Part, Failure> {
     let target = TargetArguments { target: target.to_owned(), ..arguments.target.clone() };
     let (path, bytes) = super::target::read(&target)?;
     match codec::open(&bytes) {
@@ -76,7 +110,7 @@ fn over(arguments: &RenderArguments, target: &str) -> Result<topipe_mesh::Part, 
             .map_err(|error| Failure::new(ExitCode::Storage, error.to_string())),
         Ok((header, _)) => Err(Failure::new(
             ExitCode::Usage,
-            format!("--over {}: a mesh is needed, not a {}", target.target, header.kind),
+            format!("{option} {}: a mesh is needed, not a {}", target.target, header.kind),
         )),
         Err(codec::DecodeError::NotAnArtifact) => {
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();

@@ -35,13 +35,23 @@ pub(crate) fn run(arguments: &RunArguments, verbosity: Verbosity) -> Result<Exit
     if let Some(table) = &table {
         write_atomically(&options.out.join("sweep.csv"), table.csv().as_bytes())?;
     }
+    // What was written stays written, so that a report that cannot be is a failure of its own.
+    let reports = crate::report::write_all(&pipeline, &record, &cache, &registry, &options.out);
     if !arguments.json && verbosity > Verbosity::Quiet {
-        let figures = match table {
-            Some(table) => vec![("sweep.csv".to_owned(), table.text())],
-            None => figures(&record, &cache),
+        let (figures, broken) = match table {
+            Some(table) => (vec![("sweep.csv".to_owned(), table.text())], None),
+            None => {
+                let measured = measured(&record, &cache);
+                let broken: Vec<_> = measured.iter().filter_map(|m| m.broken.as_ref()).collect();
+                let broken =
+                    (!broken.is_empty()).then(|| broken.into_iter().flatten().cloned().collect::<Vec<_>>());
+                (measured.into_iter().map(|m| (m.stage, m.text)).collect(), broken)
+            }
         };
-        super::print(&display::summary(&record, &options.out, &figures))?;
+        let written = reports.as_deref().unwrap_or_default();
+        super::print(&display::summary(&record, &options.out, &figures, written, broken.as_deref()))?;
     }
+    reports?;
     Ok(record.code)
 }
 
@@ -84,28 +94,37 @@ const USUAL_FIGURES: &[(&str, &str)] = &[
     (Report::NAME, "skeleton.e_center"),
 ];
 
-/// The main figures of each report of the run.
-fn figures(record: &RunRecord, cache: &Cache) -> Vec<(String, String)> {
-    let mut figures = Vec::new();
+/// What a stage measured, as text, and the figures of a report that are out of their limits.
+struct Measured {
+    stage: String,
+    text: String,
+    broken: Option<Vec<topipe_report::figures::Finding>>,
+}
+
+/// The main figures of each report and each stiffness of the run.
+fn measured(record: &RunRecord, cache: &Cache) -> Vec<Measured> {
+    let mut measured = Vec::new();
     for stage in &record.stages {
         let Some(artifact) = stage.artifact else { continue };
-        // A report that cannot be read now is told of by the next run.
+        let name = stage.stage.clone();
+        // A result that cannot be read now is told of by the next run.
         if stage.artifact_kind == Report::NAME {
             let loaded = cache.load(&ArtifactType::of::<Report>(), artifact, &mut Vec::new());
             if let Ok(Some(value)) = loaded
                 && let Some(report) = value.downcast_ref::<topipe_validation::Report>()
             {
-                figures.push((stage.stage.clone(), report.summary()));
+                let broken = Some(crate::report::broken(report));
+                measured.push(Measured { stage: name, text: report.summary(), broken });
             }
-        }
-        if stage.artifact_kind == Stiffness::NAME {
+        } else if stage.artifact_kind == Stiffness::NAME {
             let loaded = cache.load(&ArtifactType::of::<Stiffness>(), artifact, &mut Vec::new());
             if let Ok(Some(value)) = loaded
                 && let Some(stiffness) = value.downcast_ref::<topipe_stiffness::Stiffness>()
             {
-                figures.push((stage.stage.clone(), topipe_validation::stiffness_summary(stiffness)));
+                let text = topipe_validation::stiffness_summary(stiffness);
+                measured.push(Measured { stage: name, text, broken: None });
             }
         }
     }
-    figures
+    measured
 }

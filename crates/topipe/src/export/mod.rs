@@ -2,6 +2,7 @@
 //! [`exporters`].
 
 mod beams;
+mod exchange;
 mod import;
 mod picture;
 mod plot;
@@ -28,4 +29,5 @@ pub(crate) fn exporters() -> impl Iterator<Item = Exporter> {
         .chain(stiffness::exporters())
         .chain(validation::exporters())
         .chain(picture::exporters())
+        .chain(exchange::exporters())
 }

@@ -29,6 +29,7 @@ pub fn registry() -> Registry {
         .with_stage(stiffness::CompareStiffness)
         .with_stage(validation::Validation)
         .with_exporters(crate::export::exporters())
+        .with_file_after_run("html")
 }
 
 /// The field and the text of a parameter error, for messages that point at the field.

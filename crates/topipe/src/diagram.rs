@@ -1,7 +1,7 @@
 //! A pipeline as SVG: stages in columns by how far they are from the beginning, rows in an order with few crossings.
 
 use std::fmt::Write;
-use topipe_engine::Pipeline;
+use topipe_engine::{Outcome, Pipeline, RunRecord};
 
 /// Sizes in pixels.
 const WIDTH: f64 = 168.0;
@@ -13,15 +13,85 @@ const MARGIN: f64 = 20.0;
 struct Node {
     title: String,
     subtitle: String,
-    is_export: bool,
+    look: Look,
     column: usize,
     row: f64,
 }
 
+/// How a node is drawn.
+#[derive(Clone, Copy, PartialEq)]
+enum Look {
+    Stage,
+    Failed,
+    Skipped,
+    Export,
+}
+
 /// The picture of a pipeline.
-pub(super) fn svg(pipeline: &Pipeline) -> String {
-    let (mut nodes, edges) = graph(pipeline);
-    let columns = place(&mut nodes, &edges);
+pub(crate) fn of_pipeline(pipeline: &Pipeline) -> String {
+    let mut nodes: Vec<Node> =
+        pipeline.stages.iter().map(|stage| Node::new(&stage.name, stage.stage.kind(), Look::Stage)).collect();
+    let mut edges: Vec<Edge> =
+        pipeline.graph.edges().map(|(from, port, to)| (from, to, label(port))).collect();
+    for export in &pipeline.exports {
+        edges.push((export.stage, nodes.len(), String::new()));
+        nodes.push(Node::new(&export.file, "", Look::Export));
+    }
+    svg(nodes, &edges)
+}
+
+/// The picture of a run: what failed and what was skipped stand out.
+pub(crate) fn of_record(record: &RunRecord) -> String {
+    let look = |outcome: &Outcome| match outcome {
+        Outcome::Failed { .. } => Look::Failed,
+        Outcome::Skipped { .. } => Look::Skipped,
+        _ => Look::Stage,
+    };
+    let mut nodes: Vec<Node> = record
+        .stages
+        .iter()
+        .map(|stage| Node::new(&stage.stage, &stage.kind, look(&stage.outcome)))
+        .collect();
+    let at = |name: &str| record.stages.iter().position(|stage| stage.stage == name);
+    let mut edges: Vec<Edge> = Vec::new();
+    for (to, stage) in record.stages.iter().enumerate() {
+        let inputs = stage.inputs.iter();
+        edges.extend(inputs.filter_map(|(port, input)| Some((at(&input.stage)?, to, label(port)))));
+    }
+    for export in &record.exports {
+        if let Some(from) = at(&export.stage) {
+            edges.push((from, nodes.len(), String::new()));
+            nodes.push(Node::new(&export.file, "", Look::Export));
+        }
+    }
+    svg(nodes, &edges)
+}
+
+/// The usual port needs no name.
+fn label(port: &str) -> String {
+    if port == "input" { String::new() } else { port.to_owned() }
+}
+
+impl Node {
+    fn new(title: &str, subtitle: &str, look: Look) -> Self {
+        Self { title: title.to_owned(), subtitle: subtitle.to_owned(), look, column: 0, row: 0.0 }
+    }
+}
+
+fn svg(mut nodes: Vec<Node>, edges: &[Edge]) -> String {
+    // A node stands behind all it depends on. There are no cycles, so as many rounds as nodes are enough.
+    for _ in 0..nodes.len() {
+        let mut moved = false;
+        for (from, to, _) in edges {
+            let column = nodes[*from].column + 1;
+            moved |= nodes[*to].column < column;
+            nodes[*to].column = nodes[*to].column.max(column);
+        }
+        if !moved {
+            break;
+        }
+    }
+    let columns = place(&mut nodes, edges);
     let rows = columns.iter().map(Vec::len).max().unwrap_or(0);
     let (width, height) = (
         MARGIN * 2.0 + COLUMN * (columns.len().max(1) - 1) as f64 + WIDTH,
@@ -34,11 +104,19 @@ pub(super) fn svg(pipeline: &Pipeline) -> String {
     );
     let at =
         |node: &Node| (MARGIN + COLUMN * node.column as f64, MARGIN + ROW * node.row + (ROW - HEIGHT) / 2.0);
-    for (from, to, label) in &edges {
+    for (edge, (from, to, label)) in edges.iter().enumerate() {
         let ((x, y), (u, v)) = (at(&nodes[*from]), at(&nodes[*to]));
-        let (x, y, v) = (x + WIDTH, y + HEIGHT / 2.0, v + HEIGHT / 2.0);
+        // Several edges into a node end one below the other, in the order of where they come from.
+        let key = |k: usize| (nodes[edges[k].0].row, nodes[edges[k].0].column);
+        let mut into: Vec<usize> = (0..edges.len()).filter(|&k| edges[k].1 == *to).collect();
+        into.sort_by(|&a, &b| {
+            key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b))
+        });
+        let place = into.iter().position(|&k| k == edge).unwrap_or(0);
+        let (x, y, v) =
+            (x + WIDTH, y + HEIGHT / 2.0, v + HEIGHT * (place + 1) as f64 / (into.len() + 1) as f64);
         let bend = (u - x) / 2.0;
-        let dash = if nodes[*to].is_export { " stroke-dasharray=\"4 3\"" } else { "" };
+        let dash = if nodes[*to].look == Look::Export { " stroke-dasharray=\"4 3\"" } else { "" };
         let _ = writeln!(
             text,
             "<path d=\"M{x:.1} {y:.1} C{:.1} {y:.1} {:.1} {v:.1} {u:.1} {v:.1}\" fill=\"none\" stroke=\"#8a94a0\" \
@@ -49,17 +127,21 @@ pub(super) fn svg(pipeline: &Pipeline) -> String {
         if !label.is_empty() {
             let _ = writeln!(
                 text,
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" font-size=\"10\" fill=\"#5b6570\">{}</text>",
+                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" font-size=\"8.5\" fill=\"#5b6570\">{}</text>",
                 u - 5.0,
-                v - 5.0,
+                v - 2.5,
                 escape(label)
             );
         }
     }
     for node in &nodes {
         let (x, y) = at(node);
-        let (fill, stroke, radius) =
-            if node.is_export { ("#f6f4ee", "#b8ae94", HEIGHT / 2.0) } else { ("#e8f0f8", "#5b84ad", 5.0) };
+        let (fill, stroke, radius) = match node.look {
+            Look::Stage => ("#e8f0f8", "#5b84ad", 5.0),
+            Look::Failed => ("#fdf1ef", "#a3271f", 5.0),
+            Look::Skipped => ("#fdf6e3", "#b8973a", 5.0),
+            Look::Export => ("#f6f4ee", "#b8ae94", HEIGHT / 2.0),
+        };
         let _ = writeln!(
             text,
             "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" rx=\"{radius}\" fill=\"{fill}\" \
@@ -81,36 +163,6 @@ pub(super) fn svg(pipeline: &Pipeline) -> String {
 }
 
 type Edge = (usize, usize, String);
-
-fn graph(pipeline: &Pipeline) -> (Vec<Node>, Vec<Edge>) {
-    let node = |title: &str, subtitle: &str, is_export| Node {
-        title: title.to_owned(),
-        subtitle: subtitle.to_owned(),
-        is_export,
-        column: 0,
-        row: 0.0,
-    };
-    let mut nodes: Vec<Node> =
-        pipeline.stages.iter().map(|stage| node(&stage.name, stage.stage.kind(), false)).collect();
-    let mut edges: Vec<Edge> = pipeline
-        .graph
-        .edges()
-        .map(|(from, port, to)| (from, to, if port == "input" { String::new() } else { port.to_owned() }))
-        .collect();
-    for export in &pipeline.exports {
-        edges.push((export.stage, nodes.len(), String::new()));
-        nodes.push(node(&export.file, "", true));
-    }
-    for &stage in pipeline.graph.order() {
-        let after = edges.iter().filter(|edge| edge.1 == stage).map(|edge| nodes[edge.0].column + 1).max();
-        nodes[stage].column = after.unwrap_or(0);
-    }
-    for at in pipeline.stages.len()..nodes.len() {
-        let from = edges.iter().find(|edge| edge.1 == at).map_or(0, |edge| edge.0);
-        nodes[at].column = nodes[from].column + 1;
-    }
-    (nodes, edges)
-}
 
 /// Orders each column by the mean place of the neighbours, to and fro (Sugiyama's barycentre rule), and centres it.
 fn place(nodes: &mut [Node], edges: &[Edge]) -> Vec<Vec<usize>> {

@@ -1,0 +1,228 @@
+//! `report.html`: from the record of a run and whatever results can be reached.
+//!
+//! It is no artifact and is not cached: it tells of a run, also of one that failed half way. It is written again when what
+//! it shows has changed; a run that finds all results in the cache leaves it alone, so that the times in it stay those of
+//! the run that took them.
+
+mod results;
+mod scene;
+mod surface_mesh;
+
+use crate::failure::Failure;
+use results::Results;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use topipe_engine::cache::write_atomically;
+use topipe_engine::{
+    Cache, ContentHash, ExitCode, ExportOutcome, Outcome, Pipeline, Registry, RunRecord, StageRecord,
+    parameter_fields,
+};
+use topipe_report::{Document, Export, Figures, Parameter, Stage};
+
+/// The reports that a pipeline asks for, of the stages that took part in a run. Returns the files that were written.
+pub(crate) fn write_all(
+    pipeline: &Pipeline,
+    record: &RunRecord,
+    cache: &Cache,
+    registry: &Registry,
+    out: &Path,
+) -> Result<Vec<PathBuf>, Failure> {
+    let mut written = Vec::new();
+    for export in pipeline.exports.iter().filter(|export| export.exporter.after_run) {
+        let name = &pipeline.stages[export.stage].name;
+        if !record.stages.iter().any(|stage| stage.stage == *name) {
+            continue;
+        }
+        // In a sweep a report is about the variant that its stage belongs to.
+        let about = pipeline.sweep.as_ref().map(|sweep| {
+            let folder = export.file.split('/').next().unwrap_or_default();
+            let variant = sweep.variants.iter().find(|variant| variant.name == folder);
+            let stages = variant.into_iter().flat_map(|variant| &variant.stages);
+            let names: Vec<String> = stages.map(|(_, at)| pipeline.stages[*at].name.clone()).collect();
+            (folder.to_owned(), names)
+        });
+        let shown = match &about {
+            Some((variant, names)) => part_of(record, variant, names),
+            None => record.clone(),
+        };
+        let path = out.join(&export.file);
+        if write(&shown, cache, registry, &path)? {
+            written.push(PathBuf::from(&export.file));
+        }
+    }
+    Ok(written)
+}
+
+/// The record of some stages only.
+fn part_of(record: &RunRecord, variant: &str, names: &[String]) -> RunRecord {
+    let mut part = record.clone();
+    part.pipeline = format!("{}: {variant}", record.pipeline);
+    part.stages.retain(|stage| names.contains(&stage.stage));
+    let folder = format!("{variant}/");
+    part.exports.retain(|export| export.file.starts_with(&folder));
+    part
+}
+
+/// Writes the report of a run, unless the file shows the same already. Says whether it was written.
+pub(crate) fn write(
+    record: &RunRecord,
+    cache: &Cache,
+    registry: &Registry,
+    path: &Path,
+) -> Result<bool, Failure> {
+    let key = key(record);
+    if is_up_to_date(path, key) {
+        return Ok(false);
+    }
+    let page = topipe_report::html(&document(record, cache, registry));
+    // A browser takes a comment before the doctype for none, so it stands behind it.
+    let (doctype, rest) = page.split_once('>').unwrap_or((page.as_str(), ""));
+    let seal = seal(key, page.len());
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder).map_err(|error| Failure::io("make the folder", folder, &error))?;
+    }
+    write_atomically(path, format!("{doctype}>{seal}{rest}").as_bytes())?;
+    Ok(true)
+}
+
+/// What a report is of, and how long the page is: a file that was cut off or added to is written again.
+fn seal(key: ContentHash, length: usize) -> String {
+    format!("<!-- topipe report {} {length:012} -->", key.to_hex())
+}
+
+fn is_up_to_date(path: &Path, key: ContentHash) -> bool {
+    let known = || {
+        let mut file = std::fs::File::open(path).ok()?;
+        let length = file.metadata().ok()?.len() as usize;
+        let mut start = [0; 256];
+        let read = file.read(&mut start).ok()?;
+        let start = String::from_utf8_lossy(&start[..read]).into_owned();
+        let empty = seal(key, 0).len();
+        Some(start.contains(&seal(key, length.checked_sub(empty)?)))
+    };
+    known().unwrap_or(false)
+}
+
+/// What the report shows, but for times and for what was cached.
+fn key(record: &RunRecord) -> ContentHash {
+    let mut text = format!("{} {} {}\n", env!("TOPIPE_WRITER_REPORT"), record.program, record.pipeline);
+    for stage in &record.stages {
+        let state = match &stage.outcome {
+            Outcome::Computed | Outcome::Cached => String::new(),
+            Outcome::Failed { message, .. } => format!("failed {message}"),
+            Outcome::Skipped { because } => format!("skipped {because}"),
+        };
+        text += &format!("{} {:?} {:?} {state}\n", stage.stage, stage.key, stage.artifact);
+    }
+    for export in &record.exports {
+        text += &format!("{} {:?}\n", export.file, export.hash);
+    }
+    ContentHash::of(text.as_bytes())
+}
+
+/// Everything the page shows.
+fn document(record: &RunRecord, cache: &Cache, registry: &Registry) -> Document {
+    let results = Results::load(record, cache, registry);
+    let (scene, histograms) = scene::scene(&results);
+    let figures = results.reports();
+    let value = |report: &topipe_validation::Report| {
+        let mut value: serde_json::Value = serde_json::from_str(&report.to_json()).unwrap_or_default();
+        if let Some(sections) = value.as_object_mut() {
+            sections.retain(|_, section| !section.is_null());
+        }
+        value
+    };
+    let machine = &record.machine;
+    let mut facts = vec![("threads".to_owned(), machine.threads.to_string())];
+    if let Some(bytes) = machine.peak_memory_bytes {
+        facts.push(("peak memory".to_owned(), crate::display::size(bytes)));
+    }
+    Document {
+        title: record.pipeline.clone(),
+        program: record.program.clone(),
+        started: record.started.clone(),
+        seconds: record.seconds,
+        problems: problems(record),
+        machine: facts,
+        stages: record.stages.iter().map(|s| stage(s, registry)).collect(),
+        exports: record
+            .exports
+            .iter()
+            .map(|export| Export {
+                file: export.file.clone(),
+                stage: export.stage.clone(),
+                state: match &export.outcome {
+                    ExportOutcome::Written => "written".into(),
+                    ExportOutcome::UpToDate => "up to date".into(),
+                    ExportOutcome::Skipped => "missing: its stage gave no result".into(),
+                    ExportOutcome::Failed { message, .. } => format!("failed: {message}"),
+                },
+                bytes: export.bytes,
+            })
+            .collect(),
+        diagram: crate::diagram::of_record(record),
+        figures: figures
+            .into_iter()
+            .map(|(stage, report)| Figures { stage: stage.to_owned(), value: value(report) })
+            .collect(),
+        histograms,
+        scene,
+        missing: results.missing.clone(),
+    }
+}
+
+/// The figures of a report that are out of their limits.
+pub(crate) fn broken(report: &topipe_validation::Report) -> Vec<topipe_report::figures::Finding> {
+    topipe_report::figures::broken(&serde_json::from_str(&report.to_json()).unwrap_or_default())
+}
+
+fn problems(record: &RunRecord) -> Vec<String> {
+    let mut problems = Vec::new();
+    for stage in &record.stages {
+        if let Outcome::Failed { message, .. } = &stage.outcome {
+            problems.push(format!("Stage {} failed: {message}", stage.stage));
+        }
+    }
+    for export in &record.exports {
+        if let ExportOutcome::Failed { message, .. } = &export.outcome {
+            problems.push(format!("{} could not be written: {message}", export.file));
+        }
+    }
+    if problems.is_empty() && record.code == ExitCode::Interrupted {
+        problems.push("The run was interrupted.".into());
+    }
+    problems
+}
+
+fn stage(record: &StageRecord, registry: &Registry) -> Stage {
+    let kind = registry.stage(&record.kind);
+    let fields = kind.map(|kind| parameter_fields(kind.as_ref())).unwrap_or_default();
+    let parameters = record.parameters.as_object().into_iter().flatten().map(|(name, value)| {
+        let field = fields.iter().find(|field| field.name == *name);
+        Parameter {
+            name: name.clone(),
+            doc: field.map_or_else(String::new, |field| field.doc.replace('\n', " ")),
+            value: value.clone(),
+            default: field.map_or(serde_json::Value::Null, |field| field.default.clone()),
+        }
+    });
+    Stage {
+        name: record.stage.clone(),
+        kind: record.kind.clone(),
+        summary: kind.map_or_else(String::new, |kind| kind.summary().to_owned()),
+        outcome: match &record.outcome {
+            Outcome::Computed => topipe_report::Outcome::Computed,
+            Outcome::Cached => topipe_report::Outcome::Cached,
+            Outcome::Failed { message, .. } => topipe_report::Outcome::Failed(message.clone()),
+            Outcome::Skipped { because } => topipe_report::Outcome::Skipped(because.clone()),
+        },
+        seconds: record.seconds,
+        peak_memory_bytes: record.peak_memory_bytes,
+        bytes: record.bytes,
+        reasons: record.reasons.iter().map(ToString::to_string).collect(),
+        remarks: record.remarks.clone(),
+        parts: record.units.as_ref().map(|units| (units.reused, units.computed)),
+        inputs: record.inputs.iter().map(|(port, input)| (port.clone(), input.stage.clone())).collect(),
+        parameters: parameters.collect(),
+    }
+}
