@@ -222,6 +222,30 @@ const KNOWN: &[Figure] = &[
     figure("surface.planes", "Faces that are exact planes", "", No),
     figure("surface.cylinders", "Faces that are exact cylinders", "", No),
     figure("surface.flatness_mm", "Largest distance of the border of a plane from it", "", AtMost(1e-6)),
+    figure("stiffness.young_MPa", "Young's modulus", "", No),
+    figure("stiffness.poisson", "Poisson's ratio", "", No),
+    figure("stiffness.cell_mm", "Edge of the cells", "", No),
+    figure("stiffness.load_cases", "Load cases", "", No),
+    figure(
+        "stiffness.original.compliance_Nmm",
+        "Compliance of the mesh as imported: how far it gives way",
+        "",
+        No,
+    ),
+    figure("stiffness.original.compliance_change", "Its change against itself", "", No),
+    figure(
+        "stiffness.smoothed.compliance_change",
+        "Compliance of the smoothed mesh against that",
+        "Compliance by smoothing",
+        No,
+    ),
+    figure(
+        "stiffness.surface.compliance_change",
+        "Compliance of the CAD solid against that",
+        "Compliance of the solid",
+        No,
+    ),
+    figure("stiffness.frame.compliance_change", "Compliance of the beams against that", "", No),
     figure("skeleton.compactness", "Points on branches", "", No),
     figure(
         "skeleton.e_center",
@@ -397,7 +421,9 @@ fn judge(report: &Value, value: &Value, limit: &Limit, unit: &str) -> (Option<St
 fn shown(key: &str, value: &Value) -> String {
     let (_, unit) = unit(key);
     match value.as_f64() {
-        Some(x) if key.contains("_error") && x.abs() >= 1e-6 => format!("{:+.4} %", 100.0 * x),
+        Some(x) if (key.contains("_error") || key.ends_with("_change")) && x.abs() >= 1e-6 => {
+            format!("{:+.4} %", 100.0 * x)
+        }
         _ => with_unit(value, unit),
     }
 }
@@ -414,14 +440,16 @@ impl Walk<'_> {
             let path = format!("{path}.{key}");
             match value {
                 // Shown as bars, and as places of other figures.
-                Value::Array(_) if key == "histogram" || key == "max_at" => {}
+                Value::Array(_) if key == "histogram" || key.ends_with("_at") => {}
                 Value::Array(items) if items.iter().any(Value::is_object) => self.table(&path, key, items),
                 Value::Array(items) if items.is_empty() => {}
                 Value::Object(inner) if !inner.keys().all(|key| key.parse::<f64>().is_ok()) => {
                     self.object(&path, inner);
                 }
                 value => {
-                    let at = if key.starts_with("max") { point(fields.get("max_at")) } else { None };
+                    let own = point(fields.get(&format!("{}_at", unit(key).0)));
+                    let of_all = || if key.starts_with("max") { point(fields.get("max_at")) } else { None };
+                    let at = own.or_else(of_all);
                     self.figure(path, key, value, at);
                 }
             }
@@ -557,6 +585,10 @@ pub fn sections(report: &Value) -> Vec<Section> {
 
 /// The sections that a report may have and this one has not, by title.
 pub fn missing(report: &Value) -> Vec<&'static str> {
+    // What tells of no mesh is no validation.
+    if report.get("original").is_none() {
+        return Vec::new();
+    }
     let named = SECTIONS.iter().filter(|(key, ..)| *key != "stiffness");
     named.filter(|(key, ..)| report.get(key).is_none_or(Value::is_null)).map(|(_, title, _)| *title).collect()
 }
@@ -615,12 +647,13 @@ mod tests {
     #[test]
     fn what_was_never_heard_of_is_shown_under_its_name() {
         let report = json!({
-            "stiffness": {"frame": {"max_von_mises_MPa": 12.5}},
+            "stiffness": {"frame": {"max_von_mises_MPa": 12.5, "max_von_mises_at": [1.0, 2.0, 3.0]}},
             "new_thing": {"odd_length_mm": 3, "list": [{"a_mm": 1.0, "point": [0, 0, 1]}, {"b": null}], "nothing": null},
         });
         let sections = sections(&report);
         assert_eq!(sections[0].title, "Stiffness");
-        assert_eq!(find(&sections, "stiffness.frame.max_von_mises_MPa").value, "12.50 MPa");
+        let stress = find(&sections, "stiffness.frame.max_von_mises_MPa");
+        assert_eq!((stress.value.as_str(), stress.at), ("12.50 MPa", Some([1.0, 2.0, 3.0])));
         let new = &sections[1];
         assert_eq!((new.title.as_str(), new.findings.len()), ("New thing", 2));
         assert_eq!((new.findings[0].words.as_str(), new.findings[0].value.as_str()), ("Odd length", "3 mm"));

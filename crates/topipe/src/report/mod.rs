@@ -124,14 +124,19 @@ fn key(record: &RunRecord) -> ContentHash {
 fn document(record: &RunRecord, cache: &Cache, registry: &Registry) -> Document {
     let results = Results::load(record, cache, registry);
     let (scene, histograms) = scene::scene(&results);
-    let figures = results.reports();
-    let value = |report: &topipe_validation::Report| {
-        let mut value: serde_json::Value = serde_json::from_str(&report.to_json()).unwrap_or_default();
-        if let Some(sections) = value.as_object_mut() {
-            sections.retain(|_, section| !section.is_null());
+    let mut figures: Vec<Figures> = Vec::new();
+    for (stage, report) in results.reports() {
+        let value = serde_json::from_str(&report.to_json()).unwrap_or_default();
+        figures.push(Figures { stage: stage.to_owned(), value });
+    }
+    // A report that has taken over a comparison of stiffness tells of it already.
+    let told = |figures: &[Figures]| figures.iter().any(|figures| figures.value.get("stiffness").is_some());
+    for (stage, stiffness) in results.of::<crate::artifacts::Stiffness>() {
+        if !told(&figures) {
+            let value = serde_json::json!({ "stiffness": stiffness });
+            figures.push(Figures { stage: stage.stage.clone(), value });
         }
-        value
-    };
+    }
     let machine = &record.machine;
     let mut facts = vec![("threads".to_owned(), machine.threads.to_string())];
     if let Some(bytes) = machine.peak_memory_bytes {
@@ -161,10 +166,7 @@ fn document(record: &RunRecord, cache: &Cache, registry: &Registry) -> Document 
             })
             .collect(),
         diagram: crate::diagram::of_record(record),
-        figures: figures
-            .into_iter()
-            .map(|(stage, report)| Figures { stage: stage.to_owned(), value: value(report) })
-            .collect(),
+        figures,
         histograms,
         scene,
         missing: results.missing.clone(),
