@@ -8,7 +8,8 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Stage, its crate, and the file of its adapter in `stages` and of its writers in `export`. Pictures are no stage, they
+/// Stage, its crate, and the file of its adapter in `stages` and of its writers in `export`. Pictures, exchange formats and
+/// the report are no stages, they
 /// have a writer only.
 const PARTS: [(&str, &str, &str); 14] = [
     ("IMPORT", "mesh", "import.rs"),
