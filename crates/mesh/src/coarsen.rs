@@ -7,7 +7,7 @@
 use crate::refine::Refiner;
 use crate::{Connectivity, ConnectivityError, FaceId, HalfEdgeId, Provenance, VertexId};
 use glam::{DVec2, DVec3};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// A coarsened refiner, with what is needed to follow it.
 #[derive(Debug)]
@@ -105,7 +105,7 @@ impl Refiner {
         part.design.clear();
         part.region_of_face.clear();
         let (mut parent_face, mut new_labels) = (Vec::new(), Vec::new());
-        let mut features = HashMap::with_capacity(self.features.len());
+        let mut features = FxHashMap::with_capacity_and_hasher(self.features.len(), Default::default());
         for (parent, own) in children.iter().enumerate() {
             let Some(&first) = own.first() else { continue };
             let mut push = |corners: [VertexId; 3], label: u32| {

@@ -11,21 +11,22 @@
 
 use crate::{FaceId, TriangleMesh, VertexId};
 use glam::{DVec2, DVec3};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// Plane coordinates of the vertices of a disk.
 #[derive(Debug, Clone)]
 pub struct DiskMap {
     /// Vertex to place, for all vertices of the disk.
-    pub places: HashMap<VertexId, DVec2>,
+    pub places: FxHashMap<VertexId, DVec2>,
 }
 
 impl DiskMap {
     /// Maps the vertices of `faces`: those in `fixed` to the given places, the others to the mean-value combination
     /// of their neighbours. `None` when some vertex has no path to a fixed one or the numbers overflow.
-    pub fn solve(mesh: &TriangleMesh, faces: &[FaceId], fixed: &HashMap<VertexId, DVec2>) -> Option<Self> {
+    pub fn solve(mesh: &TriangleMesh, faces: &[FaceId], fixed: &FxHashMap<VertexId, DVec2>) -> Option<Self> {
         // Free vertices in the order in which they are met, then reordered for a narrow band.
-        let mut index: HashMap<VertexId, usize> = HashMap::with_capacity(faces.len());
+        let mut index: FxHashMap<VertexId, usize> =
+            FxHashMap::with_capacity_and_hasher(faces.len(), Default::default());
         let mut free = Vec::new();
         let mut rows: Vec<Vec<(VertexId, f64)>> = Vec::new();
         for &face in faces {
@@ -87,7 +88,8 @@ impl DiskMap {
             }
         }
         system.solve(&mut right)?;
-        let mut places: HashMap<VertexId, DVec2> = HashMap::with_capacity(free.len() + fixed.len());
+        let mut places: FxHashMap<VertexId, DVec2> =
+            FxHashMap::with_capacity_and_hasher(free.len() + fixed.len(), Default::default());
         for &face in faces {
             for v in mesh.triangles[face.index()] {
                 let at = match index.get(&v) {
@@ -124,7 +126,7 @@ fn half_angle_tangent(a: DVec3, b: DVec3) -> f64 {
 }
 
 /// An order of the free vertices in which neighbours stand close together: breadth-first from an end of the graph.
-fn cuthill_mckee(rows: &[Vec<(VertexId, f64)>], index: &HashMap<VertexId, usize>) -> Vec<usize> {
+fn cuthill_mckee(rows: &[Vec<(VertexId, f64)>], index: &FxHashMap<VertexId, usize>) -> Vec<usize> {
     let neighbors: Vec<Vec<usize>> = rows
         .iter()
         .map(|row| {
@@ -254,7 +256,7 @@ mod tests {
         TriangleMesh::from_arrays(positions, triangles)
     }
 
-    fn border(mesh: &TriangleMesh) -> HashMap<VertexId, DVec2> {
+    fn border(mesh: &TriangleMesh) -> FxHashMap<VertexId, DVec2> {
         mesh.vertices()
             .map(|v| (v, mesh.position(v).truncate()))
             .filter(|(_, p)| [p.x, p.y].iter().any(|&c| c == 0.0 || c == 1.0))
@@ -299,6 +301,6 @@ mod tests {
     fn without_fixed_vertices_there_is_no_map() {
         let mesh = grid(2, |_, _| 0.0);
         let faces: Vec<FaceId> = mesh.faces().collect();
-        assert!(DiskMap::solve(&mesh, &faces, &HashMap::new()).is_none());
+        assert!(DiskMap::solve(&mesh, &faces, &FxHashMap::default()).is_none());
     }
 }

@@ -7,7 +7,7 @@ use crate::{
     Connectivity, ConnectivityError, FaceId, FeatureEdge, FeatureKind, HalfEdgeId, Part, Provenance, VertexId,
 };
 use glam::DVec3;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// A part under refinement. Provenance and parent faces refer to the part it was made from.
 #[derive(Debug, Clone)]
@@ -17,7 +17,7 @@ pub struct Refiner {
     pub(crate) outgoing: Vec<HalfEdgeId>,
     pub(crate) parent_face: Vec<FaceId>,
     pub(crate) parent_triangles: Vec<[VertexId; 3]>,
-    pub(crate) features: HashMap<[VertexId; 2], FeatureKind>,
+    pub(crate) features: FxHashMap<[VertexId; 2], FeatureKind>,
 }
 
 /// What a split made: the new vertex, and each new face with the face it was cut from.

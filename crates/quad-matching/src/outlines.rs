@@ -6,7 +6,7 @@
 use crate::refine::Regions;
 use crate::sides::Tiled;
 use crate::{MacroEdge, QuadMatchingError, RegionFace, Side};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 use topipe_mesh::{FeatureKind, HalfEdgeId, RegionId, VertexId};
 use topipe_tiling::Tiling;
 
@@ -41,7 +41,7 @@ pub(crate) fn outlines(tiling: &Tiling) -> Result<(Regions, Vec<RegionFace>), Qu
     }
     let mut edges: Vec<MacroEdge> = Vec::new();
     // The side that starts along a half-edge out of a corner.
-    let mut side_at: HashMap<HalfEdgeId, Side> = HashMap::new();
+    let mut side_at: FxHashMap<HalfEdgeId, Side> = FxHashMap::default();
     for &start in &vertices {
         for first in tiled.refiner.outgoing(start) {
             if !border(first) || side_at.contains_key(&first) {
@@ -78,7 +78,7 @@ pub(crate) fn outlines(tiling: &Tiling) -> Result<(Regions, Vec<RegionFace>), Qu
     let tiles = tiling.tile_count();
     let mut seen = vec![false; half_edges];
     let mut sides: Vec<Vec<Side>> = vec![Vec::new(); tiles];
-    let mut loops: HashMap<RegionId, Vec<Vec<Side>>> = HashMap::new();
+    let mut loops: FxHashMap<RegionId, Vec<Vec<Side>>> = FxHashMap::default();
     for &start in &vertices {
         for first in tiled.refiner.outgoing(start) {
             if !border(first) || seen[first.index()] {

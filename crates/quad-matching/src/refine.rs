@@ -8,7 +8,7 @@ use crate::sides::Tiled;
 use crate::spokes::{self, SpokeTask};
 use crate::{MacroEdge, QuadMatchingError, Side};
 use rayon::prelude::*;
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 use topipe_mesh::refine::Refiner;
 use topipe_mesh::{FaceId, HalfEdgeId, Provenance, VertexId};
 use topipe_progress::Progress;
@@ -200,7 +200,7 @@ fn fine_middle(fine: &[MacroEdge], edge: u32) -> u32 {
 /// The quad of each face: what can be reached from a face beside its first side without crossing any side.
 fn flood(tiled: &Tiled, edges: &[MacroEdge], quads: &[[Side; 4]]) -> Result<Vec<u32>, QuadMatchingError> {
     let key = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];
-    let blocked: HashSet<[VertexId; 2]> =
+    let blocked: FxHashSet<[VertexId; 2]> =
         edges.iter().flat_map(|e| e.path.windows(2)).map(|w| key(w[0], w[1])).collect();
     let mut quad_of_face = vec![u32::MAX; tiled.tile_of_face.len()];
     for (q, quad) in quads.iter().enumerate() {

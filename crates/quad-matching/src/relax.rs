@@ -10,7 +10,8 @@ use crate::refine::Regions;
 use crate::sides::Tiled;
 use crate::spokes::Cutter;
 use glam::{DMat2, DVec2};
-use std::collections::{BTreeMap, HashMap, HashSet};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use topipe_mesh::disk_map::DiskMap;
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, TriangleMesh, VertexId};
@@ -56,7 +57,7 @@ struct Incidence {
 impl Incidence {
     fn new(regions: &Regions) -> Self {
         let mut at: Vec<Vec<Corner>> = vec![Vec::new(); regions.vertices.len()];
-        let mut along: HashMap<(u32, bool), Corner> = HashMap::new();
+        let mut along: FxHashMap<(u32, bool), Corner> = FxHashMap::default();
         for (r, sides) in regions.sides.iter().enumerate() {
             for (k, side) in sides.iter().enumerate() {
                 at[regions.edges[side.edge as usize].ends[side.reversed as usize] as usize].push((r, k));
@@ -73,7 +74,7 @@ impl Incidence {
             .iter()
             .map(|corners| {
                 let mut fans = Vec::new();
-                let mut used: HashSet<Corner> = HashSet::new();
+                let mut used: FxHashSet<Corner> = FxHashSet::default();
                 let starts = |&(r, k): &Corner| is_feature(regions.sides[r][k].edge);
                 let (open, rest): (Vec<Corner>, Vec<Corner>) = corners.iter().copied().partition(starts);
                 for first in open.into_iter().chain(rest) {
@@ -189,7 +190,7 @@ fn relax_one(
     snap: f64,
 ) -> bool {
     let members: Vec<usize> = fan.corners.iter().map(|c| c.0).collect();
-    if members.iter().collect::<HashSet<_>>().len() != members.len() {
+    if members.iter().collect::<FxHashSet<_>>().len() != members.len() {
         return false;
     }
     let before = star_cost(regions, fan);
@@ -226,7 +227,7 @@ fn relax_one(
         border.extend(&out[..out.len() - 1]);
     }
     let Some(ring_end) = ring_end else { return false };
-    if border.iter().collect::<HashSet<_>>().len() != border.len() {
+    if border.iter().collect::<FxHashSet<_>>().len() != border.len() {
         return false;
     }
     // The edges that are cut anew, as out-sides of the corners after them.
@@ -256,7 +257,8 @@ fn relax_one(
     }
     let mut map = None;
     for round in 0..=SHEAR_ROUNDS {
-        let mut fixed: HashMap<VertexId, DVec2> = HashMap::with_capacity(border.len());
+        let mut fixed: FxHashMap<VertexId, DVec2> =
+            FxHashMap::with_capacity_and_hasher(border.len(), Default::default());
         for i in 0..n {
             let (end, stop) =
                 if i + 1 < n { (begins[i + 1], ring[begins[i + 1]]) } else { (ring.len(), ring_end) };
@@ -389,7 +391,7 @@ const PATIENCE: f64 = 0.2;
 
 /// Places a chain of vertices but for its last by its length.
 fn place(
-    fixed: &mut HashMap<VertexId, DVec2>,
+    fixed: &mut FxHashMap<VertexId, DVec2>,
     mesh: &TriangleMesh,
     chain: &[VertexId],
     at: impl Fn(f64) -> DVec2,
@@ -409,7 +411,7 @@ fn flood(tiled: &Tiled, vertex: VertexId, members: &[usize]) -> Vec<FaceId> {
     let inside = |f: FaceId| members.contains(&(tiled.tile_of_face[f.index()] as usize));
     let mut faces: Vec<FaceId> =
         tiled.refiner.outgoing(vertex).iter().map(|h| h.face()).filter(|&f| inside(f)).collect();
-    let mut seen: HashSet<FaceId> = faces.iter().copied().collect();
+    let mut seen: FxHashSet<FaceId> = faces.iter().copied().collect();
     let mut next = 0;
     while next < faces.len() {
         for k in 0..3 {
@@ -438,8 +440,8 @@ fn set(regions: &mut Regions, spokes: &[Corner], paths: &[Vec<VertexId>]) {
 /// Labels the faces of a star with the regions the paths bound. False when that fails.
 fn fill(regions: &mut Regions, faces: &[FaceId], fan: &Fan, ring: &[VertexId], begins: &[usize]) -> bool {
     let key = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];
-    let inside: HashSet<FaceId> = faces.iter().copied().collect();
-    let mut blocked: HashSet<[VertexId; 2]> = HashSet::new();
+    let inside: FxHashSet<FaceId> = faces.iter().copied().collect();
+    let mut blocked: FxHashSet<[VertexId; 2]> = FxHashSet::default();
     for &corner in &fan.corners {
         blocked.extend(path(regions, corner).windows(2).map(|w| key(w[0], w[1])));
     }

@@ -9,7 +9,8 @@
 use crate::QuadMatchingError;
 use crate::sides::Tiled;
 use glam::DVec2;
-use std::collections::{BTreeSet, HashMap, HashSet, VecDeque};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::{BTreeSet, VecDeque};
 use std::f64::consts::{PI, TAU};
 use topipe_mesh::disk_map::DiskMap;
 use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
@@ -72,7 +73,7 @@ pub(crate) fn map(tiled: &Tiled, task: &SpokeTask) -> Option<DiskMap> {
             start += sectors[i];
         }
     }
-    let mut fixed: HashMap<VertexId, DVec2> = HashMap::with_capacity(n);
+    let mut fixed: FxHashMap<VertexId, DVec2> = FxHashMap::with_capacity_and_hasher(n, Default::default());
     for k in 0..n {
         fixed.insert(task.border[k], DVec2::from_angle(angle[k]));
     }
@@ -124,7 +125,7 @@ pub(crate) fn cut(
     map: Option<DiskMap>,
     snap: f64,
 ) -> Result<(VertexId, Vec<Vec<VertexId>>), QuadMatchingError> {
-    let mut cutter = Cutter::new(task, map.unwrap_or(DiskMap { places: HashMap::new() }), snap);
+    let mut cutter = Cutter::new(task, map.unwrap_or(DiskMap { places: FxHashMap::default() }), snap);
     let site = match task.anchor {
         Some(vertex) => vertex,
         None => cutter.center(tiled, &task.faces, DVec2::ZERO, CENTER),
@@ -180,8 +181,8 @@ pub(crate) struct Cutter {
     /// Edges that were cut, in order, and the vertices that cut them.
     cuts: Vec<([VertexId; 2], VertexId)>,
     map: DiskMap,
-    border: HashSet<VertexId>,
-    on_spoke: HashSet<VertexId>,
+    border: FxHashSet<VertexId>,
+    on_spoke: FxHashSet<VertexId>,
     spoke_edges: BTreeSet<[VertexId; 2]>,
     tile: u32,
     snap: f64,
@@ -201,7 +202,7 @@ impl Cutter {
             cuts: Vec::new(),
             map,
             border: border.collect(),
-            on_spoke: HashSet::new(),
+            on_spoke: FxHashSet::default(),
             spoke_edges: BTreeSet::new(),
             tile,
             snap,
@@ -348,7 +349,7 @@ impl Cutter {
     }
 
     fn search(&self, tiled: &Tiled, site: VertexId, target: VertexId) -> Option<Vec<VertexId>> {
-        let mut from: HashMap<VertexId, VertexId> = HashMap::from([(site, site)]);
+        let mut from: FxHashMap<VertexId, VertexId> = FxHashMap::from_iter([(site, site)]);
         let mut queue = VecDeque::from([site]);
         while let Some(v) = queue.pop_front() {
             for h in tiled.refiner.outgoing(v) {

@@ -7,7 +7,8 @@
 use crate::QuadMatchingError;
 use crate::refine::Regions;
 use crate::spokes::{self, SpokeTask};
-use std::collections::{BTreeSet, HashMap, HashSet};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use topipe_mesh::disk_map::DiskMap;
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
@@ -80,7 +81,7 @@ fn straighten_one(
     let Some(seed) = tiled.refiner.half_edge(path[0], path[1]) else { return Ok(()) };
     let (id, other) = (left.0 as u32, right.0 as u32);
     let mut faces = vec![seed.face()];
-    let mut seen: HashSet<FaceId> = HashSet::from([seed.face()]);
+    let mut seen: FxHashSet<FaceId> = FxHashSet::from_iter([seed.face()]);
     let mut next = 0;
     while next < faces.len() {
         for k in 0..3 {
@@ -96,7 +97,8 @@ fn straighten_one(
 
     // b at half a turn, a at 0: each chain fills a half circle by its length.
     let mesh = &tiled.refiner.part().mesh;
-    let mut fixed: HashMap<VertexId, glam::DVec2> = HashMap::with_capacity(border.len());
+    let mut fixed: FxHashMap<VertexId, glam::DVec2> =
+        FxHashMap::with_capacity_and_hasher(border.len(), Default::default());
     for (chain, end, start_angle) in [(&to_a, a, PI), (&to_b, b, 0.0)] {
         let points: Vec<DVec3> = chain.iter().chain([&end]).map(|&v| mesh.position(v)).collect();
         let total: f64 = points.windows(2).map(|w| w[0].distance(w[1])).sum();
@@ -118,7 +120,7 @@ fn straighten_one(
 
     // What lies to the right of the new path belongs to the other region again.
     let key = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];
-    let on_path: HashSet<[VertexId; 2]> = path.windows(2).map(|w| key(w[0], w[1])).collect();
+    let on_path: FxHashSet<[VertexId; 2]> = path.windows(2).map(|w| key(w[0], w[1])).collect();
     let Some(seed) = tiled.refiner.half_edge(path[1], path[0]) else {
         return Err(QuadMatchingError::Blocked { tile: id });
     };

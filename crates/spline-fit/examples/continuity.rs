@@ -45,7 +45,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         },
         &silent,
     )?;
+    let start = Instant::now();
     let layout = topipe_quad_matching::match_quads(&tiling, &Default::default(), &silent)?;
+    println!("quads {:.2} s, {:?}", start.elapsed().as_secs_f64(), {
+        let a: Vec<f64> = layout.corner_angles().iter().flatten().map(|a| a.to_degrees()).collect();
+        let c = |l: f64, h: f64| a.iter().filter(|a| **a < l || **a > h).count();
+        (a.len(), c(45.0, 135.0), c(30.0, 150.0), c(15.0, 165.0))
+    });
     let start = Instant::now();
     let surface = fit(&layout, &parameters, &Units::none(), &Progress::new(Arc::new(Print)))?;
     println!(

@@ -5,7 +5,7 @@
 //! the fit then depends on the surface and not on how densely it is meshed, which varies a lot beside the cuts.
 
 use glam::DVec2;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 use topipe_mesh::disk_map::DiskMap;
 use topipe_mesh::{DVec3, FaceId, TriangleMesh, VertexId};
 use topipe_quad_matching::QuadLayout;
@@ -67,13 +67,14 @@ const FACES: usize = 64;
 /// A quad's faces as a mesh of their own, with the places of the vertices on its sides.
 struct Piece {
     mesh: TriangleMesh,
-    fixed: HashMap<VertexId, DVec2>,
+    fixed: FxHashMap<VertexId, DVec2>,
 }
 
 impl Piece {
     fn new(layout: &QuadLayout, quad: usize, faces: &[FaceId]) -> Self {
         let mesh = &layout.part.mesh;
-        let mut number: HashMap<VertexId, VertexId> = HashMap::with_capacity(faces.len());
+        let mut number: FxHashMap<VertexId, VertexId> =
+            FxHashMap::with_capacity_and_hasher(faces.len(), Default::default());
         let mut piece = TriangleMesh::default();
         for &f in faces {
             piece.triangles.push(mesh.triangles[f.index()].map(|v| {
@@ -84,7 +85,7 @@ impl Piece {
             }));
         }
         let corner = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
-        let mut fixed: HashMap<VertexId, DVec2> = HashMap::new();
+        let mut fixed: FxHashMap<VertexId, DVec2> = FxHashMap::default();
         for (k, side) in layout.quads[quad].iter().enumerate() {
             // Along the edge in its own direction, so that both patches get the same parameters bit for bit.
             let path = &layout.edges[side.edge as usize].path;
@@ -102,12 +103,12 @@ impl Piece {
 
     /// Divides each face into four. Vertices between two of a side that a face joins lie on the side.
     fn divide(&mut self) {
-        let mut uses: HashMap<[VertexId; 2], u32> = HashMap::new();
+        let mut uses: FxHashMap<[VertexId; 2], u32> = FxHashMap::default();
         let key = |a: VertexId, b: VertexId| if a < b { [a, b] } else { [b, a] };
         for &[a, b, c] in &self.mesh.triangles {
             [key(a, b), key(b, c), key(c, a)].into_iter().for_each(|e| *uses.entry(e).or_default() += 1);
         }
-        let mut middles: HashMap<[VertexId; 2], VertexId> = HashMap::new();
+        let mut middles: FxHashMap<[VertexId; 2], VertexId> = FxHashMap::default();
         let mut finer = Vec::with_capacity(4 * self.mesh.triangles.len());
         for [a, b, c] in std::mem::take(&mut self.mesh.triangles) {
             let [d, e, f] = [key(a, b), key(b, c), key(c, a)].map(|edge| {
