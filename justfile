@@ -84,6 +84,10 @@ kills rounds="300":
 damage rounds="1000":
     TOPIPE_DAMAGES={{rounds}} cargo test -p topipe-engine --test it random_damage
 
+# Generated parts through the whole CAD chain, so many.
+batch parts="1000" seed="1":
+    TOPIPE_BATCH={{parts}} TOPIPE_BATCH_SEED={{seed}} cargo test --release -p topipe-validation --test batch -- --nocapture
+
 # Feed the readers of meshes, specs and artifacts with mangled files, so many times each.
 fuzz executions="10000000" seed="1":
     ulimit -v 8000000; TOPIPE_FUZZ={{executions}} TOPIPE_FUZZ_SEED={{seed}} cargo test --release -p topipe --test fuzz

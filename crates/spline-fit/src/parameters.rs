@@ -29,6 +29,8 @@ pub struct Parameters {
     pub refinements: u32,
     /// Largest distance of the mesh from the surface that is not refined, over the diagonal of the part.
     pub tolerance: f64,
+    /// The same in mm; the narrower of both counts.
+    pub tolerance_mm: Option<f64>,
     /// Largest angle between the normals of two patches along an edge that is no feature, degrees; knots are inserted
     /// where it is exceeded.
     pub max_normal_jump: f64,
@@ -69,6 +71,7 @@ impl Default for Parameters {
             spans: DEFAULT_SPANS.0,
             refinements: DEFAULT_SPANS.1,
             tolerance: 1e-3,
+            tolerance_mm: None,
             max_normal_jump: 0.1,
             degree: 3,
             interior_knots: vec![1.0 / 3.0, 2.0 / 3.0],
@@ -87,6 +90,18 @@ impl Parameters {
         }
         if !(self.lambda > 0.0 && self.lambda <= 1.0) {
             return refuse("lambda", self.lambda.to_string(), "greater than 0, at most 1");
+        }
+        if !(self.tolerance >= 0.0 && self.tolerance.is_finite()) {
+            return refuse("tolerance", self.tolerance.to_string(), "0 or more");
+        }
+        if let Some(tolerance) = self.tolerance_mm.filter(|t| !(*t >= 0.0 && t.is_finite())) {
+            return refuse("tolerance_mm", tolerance.to_string(), "0 or more");
+        }
+        if !(self.max_normal_jump >= 0.0 && self.max_normal_jump.is_finite()) {
+            return refuse("max_normal_jump", self.max_normal_jump.to_string(), "0 or more, degrees");
+        }
+        if !(1..=16).contains(&self.spans) || !self.spans.is_power_of_two() {
+            return refuse("spans", self.spans.to_string(), "1, 2, 4, 8 or 16");
         }
         if self.foot_point_rounds > 20 {
             return refuse("foot_point_rounds", self.foot_point_rounds.to_string(), "0 to 20");

@@ -38,7 +38,8 @@ impl Refinement {
             spans: vec![parameters.spans as usize; setting.layout.edges.len()],
             patch_spans: vec![parameters.spans as usize; setting.layout.edges.len()],
             left: parameters.refinements,
-            tolerance: parameters.tolerance * setting.layout.part.mesh.diagonal(),
+            tolerance: (parameters.tolerance * setting.layout.part.mesh.diagonal())
+                .min(parameters.tolerance_mm.unwrap_or(f64::INFINITY)),
             angle: parameters.max_normal_jump,
         }
     }

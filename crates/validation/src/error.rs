@@ -24,6 +24,14 @@ pub enum ValidationError {
         /// What is wrong with it.
         problem: String,
     },
+    /// Limits are broken that are required.
+    #[error(
+        "validation: {broken}; refine the fit there, widen the limit, or set require = false to have it marked only"
+    )]
+    Limits {
+        /// Which, by how much and where.
+        broken: String,
+    },
     /// The computation was asked to stop.
     #[error(transparent)]
     Interrupted(#[from] topipe_progress::Interrupted),

@@ -32,6 +32,7 @@ mod cylinder_fit;
 mod deviation;
 mod error;
 mod layout;
+mod limits;
 mod linear;
 mod parameters;
 mod report;
@@ -167,5 +168,9 @@ pub fn validate(
     };
     progress.step(sections, sections, "sections of the report");
     let stiffness = inputs.stiffness.cloned();
-    Ok(Report { original: original_figures, smoothing, layout, surface, skeleton, stiffness })
+    let limits = match &surface {
+        Some(surface) => limits::check(surface, diagonal, parameters)?,
+        None => Vec::new(),
+    };
+    Ok(Report { original: original_figures, smoothing, layout, surface, skeleton, stiffness, limits })
 }

@@ -19,6 +19,23 @@ pub struct Report {
     pub skeleton: Option<SkeletonFigures>,
     /// Compliance of all models under the same loads.
     pub stiffness: Option<Stiffness>,
+    /// The limits that were set, kept or broken.
+    pub limits: Vec<LimitFigures>,
+}
+
+/// One limit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LimitFigures {
+    /// Which figure of this report.
+    pub figure: String,
+    /// What it is.
+    pub value: f64,
+    /// What it may be.
+    pub limit: f64,
+    /// It is not more.
+    pub kept: bool,
+    /// Where the figure is taken.
+    pub at: Option<[f64; 3]>,
 }
 
 /// The part as imported.
@@ -330,7 +347,8 @@ impl Report {
         // Numbers, strings and maps with printable keys: nothing that JSON can not hold.
         let mut value = serde_json::to_value(self).unwrap_or_default();
         if let Some(sections) = value.as_object_mut() {
-            sections.retain(|_, section| !section.is_null());
+            sections
+                .retain(|_, section| !section.is_null() && section.as_array().is_none_or(|a| !a.is_empty()));
         }
         let mut text = format!("{value:#}");
         text.push('\n');

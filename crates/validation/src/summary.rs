@@ -236,6 +236,10 @@ impl Report {
         if let Some(stiffness) = &self.stiffness {
             text.push_str(&stiffness_summary(stiffness));
         }
+        for limit in &self.limits {
+            let mark = if limit.kept { "ok" } else { "LIMIT" };
+            writeln!(text, "limits     {mark}: {}", limit.describe())?;
+        }
         Ok(())
     }
 }

@@ -315,12 +315,47 @@ fn a_bump_has_its_volume_and_its_height() {
 }
 
 #[test]
+fn limits_are_marked_and_only_required_ones_are_errors() {
+    let mut surface = spline_cube(2, 1);
+    surface.patches[1].control[4].z += 0.9;
+    let original = Part::new(cube(1.0));
+    let inputs = Inputs { surface: Some(&surface), ..Inputs::of(&original) };
+    let with = |parameters: Parameters| validate(&inputs, &parameters, &Progress::silent());
+    assert!(with(Parameters::default()).unwrap().limits.is_empty());
+    // 0.225 mm at (1/2, 1/2, 1.225); the diagonal is the root of three.
+    for (mm, share, kept, limit) in [
+        (Some(0.3), None, true, 0.3),
+        (Some(0.2), None, false, 0.2),
+        (Some(0.3), Some(0.1), false, 0.1 * 3f64.sqrt()),
+    ] {
+        let parameters = Parameters { max_deviation_mm: mm, max_deviation: share, ..Default::default() };
+        let report = with(parameters.clone()).unwrap();
+        let [found] = &report.limits[..] else { panic!("{:?}", report.limits) };
+        assert_eq!((found.kept, found.figure.as_str()), (kept, "surface.deviation.max_mm"));
+        close(found.limit, limit, 1e-12);
+        close(found.at.unwrap()[2], 1.225, 1e-12);
+        let marked = report.summary().contains("LIMIT: surface.deviation.max_mm is 2.2500e-1, above");
+        assert_eq!(marked, !kept, "{}", report.summary());
+        let required = with(Parameters { require: true, ..parameters });
+        match required {
+            Ok(report) => assert!(kept && report.limits[0].kept),
+            Err(error) => {
+                assert!(!kept);
+                assert!(error.to_string().contains("at (0.500, 0.500, 1.225)"), "{error}");
+            }
+        }
+    }
+    let negative = with(Parameters { max_normal_jump: Some(-1.0), ..Default::default() });
+    assert!(negative.unwrap_err().to_string().contains("max_normal_jump = -1"));
+}
+
+#[test]
 fn a_control_point_that_is_not_shared_opens_a_gap_and_a_missing_patch_the_surface() {
     let original = Part::new(cube(1.0));
     let mut surface = spline_cube(2, 1);
     // The middle of a side of one patch: B(1/2) = 1/2.
     surface.patches[1].control[1].z += 0.01;
-    let parameters = Parameters { points_per_edge: 3 };
+    let parameters = Parameters { points_per_edge: 3, ..Default::default() };
     let inputs = Inputs { surface: Some(&surface), ..Inputs::of(&original) };
     let figures = validate(&inputs, &parameters, &Progress::silent()).unwrap().surface.unwrap();
     close(figures.gap_mm, 0.005, 1e-12);
@@ -481,7 +516,11 @@ fn artifacts_that_contradict_themselves_are_refused() {
     skeleton.edges.push([2, 5]);
     assert_eq!(refused(&Inputs { skeleton: Some(&skeleton), ..Inputs::of(&original) }), "skeleton");
 
-    let bad = validate(&Inputs::of(&original), &Parameters { points_per_edge: 1 }, &Progress::silent());
+    let bad = validate(
+        &Inputs::of(&original),
+        &Parameters { points_per_edge: 1, ..Default::default() },
+        &Progress::silent(),
+    );
     assert!(matches!(bad, Err(ValidationError::Parameter { name: "points_per_edge", .. })));
     // Nothing at all is not a contradiction.
     let empty = Part::new(TriangleMesh::default());

@@ -1,0 +1,49 @@
+//! Limits that the surface shall keep, and where it does not.
+
+use crate::report::{LimitFigures, SurfaceFigures};
+use crate::{Parameters, ValidationError};
+
+/// Compares the surface with the limits that are set. Fails with `require` where one is broken.
+pub(crate) fn check(
+    surface: &SurfaceFigures,
+    diagonal: f64,
+    parameters: &Parameters,
+) -> Result<Vec<LimitFigures>, ValidationError> {
+    let asked = [parameters.max_deviation_mm, parameters.max_deviation.map(|share| share * diagonal)];
+    let mut limits = Vec::new();
+    // The narrower of both.
+    let narrower = asked.into_iter().flatten().min_by(f64::total_cmp);
+    if let (Some(limit), Some(deviation)) = (narrower, &surface.deviation) {
+        limits.push(LimitFigures {
+            figure: "surface.deviation.max_mm".into(),
+            value: deviation.max_mm,
+            limit,
+            kept: deviation.max_mm <= limit,
+            at: Some(deviation.max_at),
+        });
+    }
+    if let Some(limit) = parameters.max_normal_jump {
+        let (value, at) = surface.normal_jump_deg.as_ref().map_or((0.0, None), |j| (j.max, Some(j.max_at)));
+        limits.push(LimitFigures {
+            figure: "surface.normal_jump_deg.max".into(),
+            value,
+            limit,
+            kept: value <= limit,
+            at,
+        });
+    }
+    let broken: Vec<String> = limits.iter().filter(|l| !l.kept).map(LimitFigures::describe).collect();
+    if parameters.require && !broken.is_empty() {
+        return Err(ValidationError::Limits { broken: broken.join("; ") });
+    }
+    Ok(limits)
+}
+
+impl LimitFigures {
+    /// In a sentence without its end.
+    pub(crate) fn describe(&self) -> String {
+        let at = self.at.map_or_else(String::new, |[x, y, z]| format!(" at ({x:.3}, {y:.3}, {z:.3})"));
+        let state = if self.kept { "within" } else { "above" };
+        format!("{} is {:.4e}, {state} {:.4e}{at}", self.figure, self.value, self.limit)
+    }
+}
