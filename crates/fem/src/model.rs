@@ -15,11 +15,13 @@ const LEAST_FRACTION: f32 = 0.02;
 /// A support or a load acts on a cell only if that has so much material; else on the next one inwards.
 const FIRM: f32 = 0.4;
 
-/// Stiffness of the bedding by which a surface between grid planes is held, in moduli per cell. Infinitely stiff, all nodes
-/// of the cells that the surface passes through would be fixed, which holds the part a part of a cell too far inside. Error of
-/// the compliance of a ring held at its bore (`tests/elasticity.rs`; 4, 8 and 16 cells to the radius of the bore):
-/// 2: 9, 4, 2 %; 4: 2.2, 0.4, 0.2 %; 6: -0.4, -0.9, -0.5 %; 10: -2.9, -2.2, -1.2 %; 1000: -19, -15, -13 %.
-const BEDDING: f64 = 5.0;
+/// Stiffness of the bedding by which a surface between grid planes is held, in moduli per cell, against what presses on it and
+/// against what shears along it. Infinitely stiff, all nodes of the cells that the surface passes through would be fixed, which
+/// holds the part a part of a cell too far inside (19 % too stiff in the first test below). Errors of the compliance of a ring
+/// held at its bore, 4 and 8 cells to the radius (`tests/elasticity.rs`), pressed: 6 and 2: 1.1 and -0.2 %; 6 and 1.4: 1.5 and
+/// 0.0 %; 7 and 1.6: 0.5 and -0.5 %; sheared along its axis: -1.0 and -1.4 %; 2.7 and 0.5 %; 1.2 and -0.2 %.
+const PRESSED: f64 = 6.0;
+const SHEARED: f64 = 1.6;
 
 /// Most cells of a grid, filled or not: half a gigabyte for their fractions.
 const MOST_CELLS: u64 = 1 << 27;
@@ -157,7 +159,7 @@ impl Model {
     fn hold(&mut self, supports: &[(Vec<Option<Attached>>, [bool; 3])], attachment: &Attachment) {
         let n = self.lattice.node_count as u32;
         let mut fixed = Vec::new();
-        let mut areas: BTreeMap<u32, f64> = BTreeMap::new();
+        let mut beddings: BTreeMap<u32, f64> = BTreeMap::new();
         for ((points, directions), (surface, _)) in supports.iter().zip(&attachment.supports) {
             for (at, surface) in points.iter().zip(surface) {
                 let Some((at, corners)) = at.as_ref().and_then(|a| Some((a, self.lattice.corners(a.cell)?)))
@@ -170,7 +172,10 @@ impl Model {
                         if at.on_plane {
                             fixed.push(unknown);
                         } else {
-                            *areas.entry(unknown).or_default() += weight * surface.area;
+                            // Pressing and shearing; what couples the axes at slanted walls is left out.
+                            let across = surface.normal[d] * surface.normal[d];
+                            let bedding = PRESSED * across + SHEARED * (1.0 - across);
+                            *beddings.entry(unknown).or_default() += bedding * weight * surface.area;
                         }
                     }
                 }
@@ -178,11 +183,11 @@ impl Model {
         }
         fixed.sort_unstable();
         fixed.dedup();
-        let stiffness = BEDDING * self.young / self.grid.size;
-        self.springs = areas
+        let stiffness = self.young / self.grid.size;
+        self.springs = beddings
             .into_iter()
             .filter(|(unknown, _)| fixed.binary_search(unknown).is_err())
-            .map(|(unknown, area)| (unknown, stiffness * area))
+            .map(|(unknown, bedding)| (unknown, stiffness * bedding))
             .collect();
         self.fixed = fixed;
         // The cells of these unknowns; a spring belongs to one of them.

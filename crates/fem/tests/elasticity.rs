@@ -120,3 +120,31 @@ fn a_ring_held_at_its_bore_shrinks_as_it_should() {
     println!("ring {errors:?}");
     assert!(errors[0].abs() < 0.03 && errors[1].abs() < 0.01 && errors[2].abs() < 0.01, "{errors:?}");
 }
+
+/// The same ring with its outer wall pushed along the axis, its plane faces held across it: shear alone.
+#[test]
+fn a_ring_pushed_along_its_axis_shears_as_it_should() {
+    let (a, b, height, young, poisson) = (4.0, 8.0, 6.0, 1000.0, 0.3);
+    let ring = tube(b, a, height, 256);
+    let bore = Region::Cylinder { point: [0.0; 3], axis: [0.0, 0.0, 1.0], length: height, diameter: 2.0 * a };
+    let face = |z| Support { region: slab(2, z), directions: [true, true, false] };
+    let outer = |min, max| pulled(Region::Box { min, max }, [0.0, 0.0, 10.0]);
+    let h = height - 1e-4;
+    let load_case = LoadCase {
+        young,
+        poisson,
+        supports: vec![held(bore), face(0.0), face(height)],
+        // Quarters of the wall, so that the force is spread evenly.
+        loads: vec![
+            outer([-9.0, -9.0, 1e-4], [9.0, -b / 2f64.sqrt(), h]),
+            outer([-9.0, b / 2f64.sqrt(), 1e-4], [9.0, 9.0, h]),
+            outer([-9.0, -5.656, 1e-4], [-5.6, 5.656, h]),
+            outer([5.6, -5.656, 1e-4], [9.0, 5.656, h]),
+        ],
+    };
+    let shear = young / (2.0 * (1.0 + poisson));
+    let exact = 1600.0 * (b / a).ln() / (std::f64::consts::TAU * shear * height);
+    let errors = [1.0, 0.5].map(|size| solve(&ring, size, &load_case).unwrap().1.compliance() / exact - 1.0);
+    println!("shear {errors:?}");
+    assert!(errors[0].abs() < 0.03 && errors[1].abs() < 0.01, "{errors:?}");
+}
