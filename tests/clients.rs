@@ -343,3 +343,43 @@ fn vtk_gltf_3mf_and_decks_open_in_other_programs() {
     assert_eq!(number(&found["quads.vtp"], "/quad"), number(&report, "/layout/quads"));
     close("surface", number(&found["surface.glb"], "/volume_mm3") / volume, 1.0, 0.01);
 }
+
+/// Compliance of the spline solid by CalculiX (quadratic tetrahedra) and by ours (cubes): two methods that share nothing.
+#[test]
+fn the_solid_is_as_stiff_as_calculix_says() {
+    let Some(python) = clients() else { return };
+    // It ends with a status of its own, whatever it did.
+    if let Err(reason) = Command::new("ccx").arg("-v").output() {
+        println!("SKIPPED: CalculiX (Debian: calculix-ccx) does not start: {reason}");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let study = root().join("pipelines/studies/stiffness-y-form.toml");
+    let fixtures = root().join("fixtures").canonicalize().unwrap();
+    let spec = fs::read_to_string(study).unwrap();
+    let spec = spec.replace("../../fixtures", &fixtures.display().to_string());
+    let spec = format!("{spec}\"y-form.step\" = \"surface\"\n");
+    let file = folder.path().join("pipeline.toml");
+    fs::write(&file, &spec).unwrap();
+    run(Command::new(env!("CARGO_BIN_EXE_topipe"))
+        .args(["run", "-q"])
+        .arg(&file)
+        .arg("--out")
+        .arg(folder.path())
+        .arg("--cache")
+        .arg(folder.path().join("cache")))
+    .unwrap();
+    let ours: Value =
+        serde_json::from_slice(&fs::read(folder.path().join("stiffness-y-form.json")).unwrap()).unwrap();
+    // The load case as the spec says it.
+    let spec: toml::Table = spec.parse().unwrap();
+    let stage = serde_json::to_value(&spec["stage"]["stiffness"]).unwrap();
+    fs::write(folder.path().join("case.json"), stage.to_string()).unwrap();
+    let theirs =
+        check(python, "check_stiffness.py", &["y-form.step", "case.json", "--size", "3"], folder.path());
+    println!("{theirs:#}");
+    let force = theirs["force_N"][2].as_f64().unwrap();
+    close("force", force, -100.0, 0.1);
+    let ratio = number(&ours, "/surface/compliance_Nmm") / number(&theirs, "/compliance_Nmm");
+    close("compliance over that of CalculiX", ratio, 1.0, 0.03);
+}
