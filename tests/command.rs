@@ -263,6 +263,23 @@ fn a_value_out_of_range_is_found_before_anything_runs() {
 }
 
 #[test]
+fn a_newcomer_is_told_what_to_do_next() {
+    let shop = Workshop::new();
+    let ended = shop.topipe(&["run", "box.off"]);
+    assert_eq!(ended.code, 2);
+    assert!(
+        ended.stderr.contains("is a mesh, not a pipeline; write a pipeline for it with `topipe new box.off`")
+    );
+    std::fs::copy(shop.path("box.off"), shop.path("part.off")).unwrap();
+    let ended = shop.topipe(&["plan", "part.toml"]);
+    assert_eq!(ended.code, 2);
+    assert!(ended.stderr.contains("`topipe new part.off -o part.toml`"), "{}", ended.stderr);
+    let ended = shop.topipe(&["inspect", "box.toml"]);
+    assert_eq!(ended.code, 2);
+    assert!(ended.stderr.contains("topipe inspect STAGE --pipeline box.toml"), "{}", ended.stderr);
+}
+
+#[test]
 fn wrong_command_lines_are_exit_code_2() {
     let shop = Workshop::new();
     for arguments in [

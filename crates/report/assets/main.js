@@ -262,25 +262,28 @@ class Viewer {
     }
   }
 
-  /** While the model moves, a slow graphics card draws fewer pixels. */
+  /** The model moves, until nothing has moved it for a while. */
   moving() {
-    const now = performance.now();
-    const step = now - (this.moved ?? 0);
-    this.moved = now;
-    if (step < 400) this.pace = 0.8 * (this.pace ?? 16) + 0.2 * step;
-    if (this.pace > 55 && this.ratio === 1) {
-      this.ratio = 0.5;
-      this.resize();
-    }
+    this.inMotion = true;
+    this.request();
+  }
+
+  /** Counted from the last frame, not from the last event: a frame may take longer than that. */
+  settle() {
     clearTimeout(this.settling);
     this.settling = setTimeout(() => {
-      this.pace = 16;
-      if (this.ratio !== 1) {
-        this.ratio = 1;
-        this.resize();
-      }
+      this.inMotion = false;
+      this.hurry(false);
+      this.request();
     }, 250);
-    this.request();
+  }
+
+  /** A slow card draws fewer pixels and thin lines while the model moves. */
+  hurry(hurry) {
+    if (this.renderer.hurry === hurry) return;
+    this.renderer.hurry = hurry;
+    this.ratio = hurry ? 0.5 : 1;
+    this.resize();
   }
 
   request() {
@@ -293,7 +296,15 @@ class Viewer {
   draw() {
     this.renderer.plane = this.plane();
     const ratio = this.canvas.width / Math.max(this.canvas.clientWidth, 1);
+    const begun = performance.now();
     this.renderer.draw(this.panes, this.camera, this.ranges, ratio);
+    if (this.inMotion) {
+      // Reading a pixel waits for the card: only so its time is known, and frames do not pile up.
+      const { gl } = this.renderer;
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+      if (performance.now() - begun > 45) this.hurry(true);
+      this.settle();
+    }
     this.annotate();
     document.documentElement.dataset.viewer = 'ready';
   }

@@ -12,11 +12,14 @@ class Renderer {
     this.bytes = bytes;
     this.surfaceProgram = compile(gl, SURFACE_VERTEX, SURFACE_FRAGMENT);
     this.lineProgram = compile(gl, LINE_VERTEX, LINE_FRAGMENT);
+    this.thinLineProgram = compile(gl, THIN_LINE_VERTEX, LINE_FRAGMENT);
     this.pointProgram = compile(gl, POINT_VERTEX, POINT_FRAGMENT);
     this.maps = { sequential: this.texture(header.sequential), diverging: this.texture(header.diverging) };
     this.meshes = new Map();
     this.built = new Map();
     this.plane = null;
+    /** Draw fast rather than well. */
+    this.hurry = false;
   }
 
   /** 256 colours between the given ones. */
@@ -128,8 +131,14 @@ class Renderer {
       gl.vertexAttribPointer(location, size, gl.FLOAT, false, 32, offset);
       gl.vertexAttribDivisor(location, 1);
     }
+    const thin = gl.createVertexArray();
+    gl.bindVertexArray(thin);
+    this.buffer(0, points, 3, gl.FLOAT, false);
+    if (field) this.buffer(1, field, 1, gl.FLOAT, false);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, segments, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
-    const built = { array, count: segments.length / 2, points };
+    const built = { array, thin, count: segments.length / 2 };
     this.built.set(lines.id, built);
     return built;
   }
@@ -213,17 +222,19 @@ class Renderer {
       }
     };
     const overlays = (inFront, alpha) => {
-      let u = this.use(this.lineProgram, camera, size);
-      gl.uniform2fv(u.uSize, size);
+      const wide = !this.hurry;
+      let u = this.use(wide ? this.lineProgram : this.thinLineProgram, camera, size);
+      if (wide) gl.uniform2fv(u.uSize, size);
       gl.uniform1f(u.uLift, inFront ? 0 : 6e-4);
       for (const lines of this.header.lines.filter((l) => pane.overlays[l.id] && l.in_front === inFront)) {
         this.bindField(u, lines.field, lines.field ? ranges.get(lines.field) : 1);
         gl.uniform1i(u.uByField, lines.field ? 1 : 0);
-        gl.uniform1f(u.uWidth, lines.width * ratio);
+        if (wide) gl.uniform1f(u.uWidth, lines.width * ratio);
         gl.uniform4fv(u.uColor, [...lines.color.map((c) => c / 255), alpha]);
-        const { array, count } = this.lines(lines);
-        gl.bindVertexArray(array);
-        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
+        const { array, thin, count } = this.lines(lines);
+        gl.bindVertexArray(wide ? array : thin);
+        if (wide) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
+        else gl.drawElements(gl.LINES, 2 * count, gl.UNSIGNED_INT, 0);
       }
       u = this.use(this.pointProgram, camera, size);
       gl.uniform1f(u.uLift, inFront ? 1e-4 : 8e-4);

@@ -56,6 +56,11 @@ impl Arguments {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Look at a mesh and write a commented pipeline for it.
+    #[command(
+        after_help = "Examples:\n  topipe new part.stl\n  topipe new meshes/part.stl -o part.toml --overwrite"
+    )]
+    New(NewArguments),
     /// Run a pipeline; what is known already is not computed again.
     #[command(
         after_help = "Examples:\n  topipe run part.toml\n  topipe run part.toml --until smooth --force smooth\n  topipe run part.toml --set smooth.iterations=20 --out trial\n  topipe run part.toml --json > events.jsonl"
@@ -102,11 +107,6 @@ pub enum Command {
     Log(LogArguments),
     /// Look at the cache, or throw away what is needed least.
     Cache(CacheArguments),
-    /// Write a commented pipeline for a mesh.
-    #[command(
-        after_help = "Examples:\n  topipe new part.stl\n  topipe new meshes/part.stl -o part.toml --overwrite"
-    )]
-    New(NewArguments),
     /// Print the manual page, or write one for each command.
     #[command(
         after_help = "Examples:\n  topipe man | man -l -\n  topipe man --output ~/.local/share/man/man1"

@@ -232,7 +232,35 @@ pub(crate) fn summary(
     broken: Option<&[topipe_report::figures::Finding]>,
 ) -> String {
     let style = if colors_on_stdout() { Style::ANSI } else { Style::NONE };
-    styled_summary(record, out, figures, reports, broken, style)
+    let text = styled_summary(record, out, figures, reports, broken, style);
+    match console::Term::stdout().size_checked() {
+        Some((_, columns)) => wrapped(&text, usize::from(columns)),
+        // What is piped keeps its lines.
+        None => text,
+    }
+}
+
+/// Lines that are too long go on below, a little further in. A terminal would break words.
+fn wrapped(text: &str, columns: usize) -> String {
+    let mut out = String::with_capacity(text.len());
+    for line in text.lines() {
+        let indent = line.chars().take_while(|c| *c == ' ').count();
+        let hang = " ".repeat((indent + 2).min(columns / 2));
+        let mut used = 0;
+        for (k, word) in line.split_inclusive(' ').enumerate() {
+            let width = console::measure_text_width(word.trim_end());
+            if k > 0 && used > indent && used + width > columns.max(20) {
+                out.truncate(out.trim_end().len());
+                out.push('\n');
+                out.push_str(&hang);
+                used = hang.len();
+            }
+            out.push_str(word);
+            used += console::measure_text_width(word);
+        }
+        out.push('\n');
+    }
+    out
 }
 
 fn styled_summary(
@@ -304,6 +332,15 @@ mod tests {
         assert_eq!(duration(125.0), "2 min 5 s");
         assert_eq!(size(999), "999 B");
         assert_eq!(size(1_234_567), "1.2 MB");
+    }
+
+    #[test]
+    fn long_lines_go_on_below() {
+        let text = "name (1 s)\n  one two three four five\n\nend\n";
+        assert_eq!(wrapped(text, 80), text);
+        assert_eq!(wrapped("  one two three four five six\n", 20), "  one two three four\n    five six\n");
+        let word = "a_path_that_is_longer_than_the_terminal";
+        assert_eq!(wrapped(&format!("{word} {word}\n"), 20), format!("{word}\n  {word}\n"));
     }
 
     #[test]

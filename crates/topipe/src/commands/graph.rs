@@ -7,7 +7,7 @@ use std::fmt::Write;
 use topipe_engine::{ExitCode, Pipeline};
 
 pub(crate) fn run(arguments: &GraphArguments) -> Result<ExitCode, Failure> {
-    let pipeline = Pipeline::load(&arguments.pipeline, &[], &registry())?;
+    let pipeline = super::pipeline::load(&arguments.pipeline, &[], &registry())?;
     super::print(&match arguments.format {
         GraphFormat::Mermaid => mermaid(&pipeline),
         GraphFormat::Dot => dot(&pipeline),

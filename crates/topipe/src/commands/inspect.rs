@@ -78,6 +78,12 @@ fn artifact(header: &codec::Header, bytes: &[u8]) -> Result<String, Failure> {
 }
 
 fn mesh_file(path: &Path, bytes: &[u8]) -> Result<String, Failure> {
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+        let shown = path.display();
+        let message =
+            format!("{shown} is a pipeline; name a stage of it: `topipe inspect STAGE --pipeline {shown}`");
+        return Err(Failure::new(ExitCode::Usage, message));
+    }
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let part = topipe_mesh::import::read(&name, bytes, &Default::default())
         .map_err(|error| Failure::new(ExitCode::Refused, error.to_string()))?;

@@ -8,7 +8,7 @@ use std::fmt::Write;
 use topipe_engine::{Action, Choice, ExitCode, Pipeline, plan};
 
 pub(crate) fn run(arguments: &LogArguments) -> Result<ExitCode, Failure> {
-    let pipeline = Pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry())?;
+    let pipeline = super::pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry())?;
     let cache = crate::remote::cache(&arguments.pipeline)?;
     let choice = Choice { until: arguments.stage.iter().cloned().collect(), ..Choice::default() };
     let plan = plan(&pipeline, &cache, &choice)?;

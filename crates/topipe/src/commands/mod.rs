@@ -9,6 +9,7 @@ pub(crate) mod kinds;
 pub(crate) mod log;
 pub(crate) mod man;
 pub(crate) mod new;
+mod pipeline;
 pub(crate) mod plan;
 pub(crate) mod render;
 pub(crate) mod report;

@@ -7,7 +7,7 @@ use std::fmt::Write;
 use topipe_engine::{Action, ExitCode, Pipeline, Plan, PlannedUnits, UnitsAtHand, plan};
 
 pub(crate) fn run(arguments: &PlanArguments) -> Result<ExitCode, Failure> {
-    let pipeline = Pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry())?;
+    let pipeline = super::pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry())?;
     let cache = crate::remote::cache(&arguments.pipeline)?;
     let plan = plan(&pipeline, &cache, &arguments.choice.choice())?;
     for damage in &plan.damages {

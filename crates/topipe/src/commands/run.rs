@@ -15,7 +15,7 @@ use topipe_engine::{
 
 pub(crate) fn run(arguments: &RunArguments, verbosity: Verbosity) -> Result<ExitCode, Failure> {
     let registry = registry();
-    let pipeline = Pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry)?;
+    let pipeline = super::pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry)?;
     let options = arguments.options(&pipeline.name);
     if let Some(jobs) = arguments.jobs {
         // Fails only if the pool exists already, which it does not yet.

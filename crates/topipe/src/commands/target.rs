@@ -19,7 +19,7 @@ pub(super) fn read(arguments: &TargetArguments) -> Result<(PathBuf, Vec<u8>), Fa
 
 /// The artifact file of a stage.
 fn stage_file(arguments: &TargetArguments, path: &Path) -> Result<PathBuf, Failure> {
-    let pipeline = Pipeline::load(path, &[], &registry())?;
+    let pipeline = super::pipeline::load(path, &[], &registry())?;
     let stage = &arguments.target;
     if pipeline.index_of(stage).is_none() {
         let source = Source { name: "command line".into(), text: format!("inspect {stage}") };

@@ -1,7 +1,7 @@
 //! The results as layers, with the numbers that are shown on them as colours, and their distributions.
 
 use super::results::Results;
-use super::surface_mesh::surface_mesh;
+use super::surface_mesh::{grid, surface_mesh};
 use crate::artifacts;
 use crate::fields::{distances, limit, vertex_areas};
 use std::collections::HashMap;
@@ -28,8 +28,7 @@ const FROZEN: [u8; 3] = [28, 96, 168];
 
 /// Share of the area whose values the colours tell apart.
 const SHOWN: f64 = 0.98;
-/// Pieces of an edge of a patch, and those of a whole circle.
-const PIECES: usize = 8;
+/// Pieces of the edge of a face that is a whole circle.
 const CIRCLE: f64 = 72.0;
 
 /// Layers are added in the order in which they are listed.
@@ -155,7 +154,7 @@ impl<'a> Builder<'a> {
             let mut edges = Chains::default();
             for edge in &surface.edges {
                 let turns = edge.sweep().map_or(0.0, |sweep| sweep / std::f64::consts::TAU);
-                let pieces = PIECES.max((CIRCLE * turns).ceil() as usize);
+                let pieces = grid(surface).max((CIRCLE * turns).ceil() as usize);
                 edges.add((0..=pieces).map(|k| edge.exact(k as f64 / pieces as f64).position));
             }
             let edges = edges.lines(named(count, "patch-edges", "Edges of patches", &stage.stage), INK, 1.2);

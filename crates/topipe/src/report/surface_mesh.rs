@@ -8,12 +8,18 @@ use topipe_mesh::{DVec3, TriangleMesh, VertexId};
 use topipe_spline_fit::SplineSurface;
 
 /// Triangles of all patches together that are aimed at: fine enough for a screen, and a few hundred kilobytes.
-const TRIANGLES: usize = 100_000;
+const TRIANGLES: usize = 80_000;
 /// Largest distance of the triangles of a plane or a cylinder from it, over the diagonal.
 const CHORD: f64 = 1e-4;
 /// Longest edge inside such a face over the diagonal: numbers are shown at vertices, and a face without any inside would
 /// show those of its border.
 const LONGEST: f64 = 0.03;
+
+/// Cells of the grid of a patch along each side.
+pub(super) fn grid(surface: &SplineSurface) -> usize {
+    let per_patch = TRIANGLES / 2 / surface.patches.len().max(1);
+    ((per_patch as f64).sqrt() as usize).clamp(2, 12)
+}
 
 /// Triangles, and for each the face it belongs to: patches first, then faces of known shape.
 pub(super) fn surface_mesh(surface: &SplineSurface) -> (TriangleMesh, Vec<u32>) {
@@ -23,8 +29,7 @@ pub(super) fn surface_mesh(surface: &SplineSurface) -> (TriangleMesh, Vec<u32>) 
     let (mut mesh, faces) = surface.tessellate_faces(CHORD * diagonal, LONGEST * diagonal);
     let patches = surface.patches.len() as u32;
     let mut face_of_triangle: Vec<u32> = faces.into_iter().map(|face| face + patches).collect();
-    let per_patch = TRIANGLES / 2 / surface.patches.len().max(1);
-    let n = ((per_patch as f64).sqrt() as usize).clamp(2, 12);
+    let n = grid(surface);
     for (id, patch) in surface.patches.iter().enumerate() {
         let first = mesh.positions.len();
         for j in 0..=n {
