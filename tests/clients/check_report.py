@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 
 from PIL import Image, ImageChops
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import TimeoutError, sync_playwright
 
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
 
@@ -72,7 +72,7 @@ def main():
         page.on("request", lambda r: found["requests"].append(r.url[:120]))
         address = arguments.report.resolve().as_uri()
         page.goto(address)
-        page.wait_for_function("document.documentElement.dataset.viewer", timeout=30000)
+        page.wait_for_function("document.documentElement.dataset.viewer", timeout=60000)
         found["viewer"] = page.evaluate("document.documentElement.dataset.viewer")
         found["title"] = page.title()
         canvas = page.locator("canvas")
@@ -160,8 +160,12 @@ def main():
             differs = ImageChops.difference(model, empty).convert("L").load()
             spot = next(((x, y) for x, y in ((middle[0] + 20 * a, middle[1] + 12 * b) for a, b in spots) if differs[x, y] > 12), middle)
             canvas.hover(position={"x": spot[0], "y": spot[1]})
-            page.wait_for_timeout(400)
-            found["tip"] = page.locator(".tip").inner_text() if page.locator(".tip").is_visible() else ""
+            tip = page.locator(".tip")
+            try:
+                tip.wait_for(state="visible", timeout=5000)
+                found["tip"] = tip.inner_text()
+            except TimeoutError:
+                found["tip"] = ""
         found["contrast"] = page.evaluate(CONTRAST)
         found["nameless"] = page.evaluate(NAMELESS)
         found["headings"] = [h.inner_text() for h in page.locator("h1, h2").all()]

@@ -5,7 +5,7 @@ use crate::display;
 use crate::failure::Failure;
 use crate::stages::registry;
 use std::fmt::Write;
-use topipe_engine::{Action, Choice, ExitCode, Pipeline, plan};
+use topipe_engine::{Action, Choice, ExitCode, plan};
 
 pub(crate) fn run(arguments: &LogArguments) -> Result<ExitCode, Failure> {
     let pipeline = super::pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry())?;

@@ -4,7 +4,7 @@ use crate::args::PlanArguments;
 use crate::failure::Failure;
 use crate::stages::registry;
 use std::fmt::Write;
-use topipe_engine::{Action, ExitCode, Pipeline, Plan, PlannedUnits, UnitsAtHand, plan};
+use topipe_engine::{Action, ExitCode, Plan, PlannedUnits, UnitsAtHand, plan};
 
 pub(crate) fn run(arguments: &PlanArguments) -> Result<ExitCode, Failure> {
     let pipeline = super::pipeline::load(&arguments.pipeline.pipeline, &arguments.pipeline.set, &registry())?;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use topipe_engine::cache::write_atomically;
 use topipe_engine::{
-    ArtifactKind, ArtifactType, Cache, EventSink, ExitCode, Interrupt, Pipeline, RunRecord, SweepTable,
+    ArtifactKind, ArtifactType, Cache, EventSink, ExitCode, Interrupt, RunRecord, SweepTable,
     run as run_pipeline,
 };
 

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::stages::registry;
 use std::path::{Path, PathBuf};
 use topipe_engine::cache::Bucket;
-use topipe_engine::{Cache, Choice, Diagnostic, ExitCode, Pipeline, Source, plan};
+use topipe_engine::{Cache, Choice, Diagnostic, ExitCode, Source, plan};
 
 /// The file and its content.
 pub(super) fn read(arguments: &TargetArguments) -> Result<(PathBuf, Vec<u8>), Failure> {

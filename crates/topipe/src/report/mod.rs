@@ -123,7 +123,7 @@ fn key(record: &RunRecord) -> ContentHash {
 /// Everything the page shows.
 fn document(record: &RunRecord, cache: &Cache, registry: &Registry) -> Document {
     let results = Results::load(record, cache, registry);
-    let (scene, histograms) = scene::scene(&results);
+    let (scene, histograms, left_out) = scene::scene(&results);
     let mut figures: Vec<Figures> = Vec::new();
     for (stage, report) in results.reports() {
         let value = serde_json::from_str(&report.to_json()).unwrap_or_default();
@@ -169,7 +169,7 @@ fn document(record: &RunRecord, cache: &Cache, registry: &Registry) -> Document 
         figures,
         histograms,
         scene,
-        missing: results.missing.clone(),
+        missing: results.missing.iter().chain(&left_out).cloned().collect(),
     }
 }
 

@@ -38,17 +38,23 @@ struct Builder<'a> {
     histograms: Vec<Histogram>,
     /// Search structures by the stage of the mesh.
     indices: HashMap<String, SurfaceIndex>,
+    /// What is not shown, one sentence each.
+    left_out: Vec<String>,
 }
 
+/// Triangles of meshes that a page may hold: about 20 MB, and what a browser turns without a card of its own.
+const MOST: usize = 1_500_000;
+
 /// All layers, and the distributions of what is measured on them.
-pub(super) fn scene(results: &Results<'_>) -> (Scene, Vec<Histogram>) {
+pub(super) fn scene(results: &Results<'_>) -> (Scene, Vec<Histogram>, Vec<String>) {
     let stops = |color: &dyn Fn(f64) -> Color| (0..=32).map(|k| color(f64::from(k) / 32.0).0).collect();
     let color_maps = ColorMaps {
         sequential: stops(&palette::sequential),
         diverging: stops(&|t| palette::diverging(2.0 * t - 1.0)),
     };
     let scene = Scene { color_maps, ..Scene::default() };
-    let mut builder = Builder { results, scene, histograms: Vec::new(), indices: HashMap::new() };
+    let mut builder =
+        Builder { results, scene, histograms: Vec::new(), indices: HashMap::new(), left_out: Vec::new() };
     builder.surfaces();
     builder.meshes();
     builder.tilings();
@@ -56,7 +62,7 @@ pub(super) fn scene(results: &Results<'_>) -> (Scene, Vec<Histogram>) {
     builder.skeletons();
     builder.beams();
     builder.report_histograms();
-    (builder.scene, builder.histograms)
+    (builder.scene, builder.histograms, builder.left_out)
 }
 
 /// The first layer of its kind has the plain name, further ones that of their stage too.
@@ -120,6 +126,17 @@ impl<'a> Builder<'a> {
         distances(points, index)
     }
 
+    /// Whether there is room for a mesh; says so where there is none.
+    fn has_room(&mut self, name: &str, stage: &str, triangles: usize) -> bool {
+        let shown: usize = self.scene.surfaces.iter().map(|surface| surface.mesh.face_count()).sum();
+        let fits = shown + triangles <= MOST;
+        if !fits {
+            let more = "too many to be shown here as well";
+            self.left_out.push(format!("{name} of stage {stage}: {triangles} triangles are {more}."));
+        }
+        fits
+    }
+
     fn histogram(&mut self, title: &str, about: &str, unit: &str, values: &[f64], weights: &[f64]) {
         self.histograms.extend(Histogram::of(title, about, unit, values, weights));
     }
@@ -177,6 +194,9 @@ impl<'a> Builder<'a> {
             let count = if before.is_some() { smoothed } else { 0 };
             originals += usize::from(before.is_none());
             smoothed += usize::from(before.is_some());
+            if !self.has_room(&name, &stage.stage, part.mesh.face_count()) {
+                continue;
+            }
             let mut layer = Surface::new(&id, &name, part.mesh.clone());
             layer.categories.extend(regions(part));
             layer.categories.extend(non_design(part));
@@ -229,6 +249,9 @@ impl<'a> Builder<'a> {
     fn tilings(&mut self) {
         for (count, (stage, tiling)) in self.results.of::<artifacts::Tiling>().into_iter().enumerate() {
             let (id, name) = named(count, "tiles", "Tiles", &stage.stage);
+            if !self.has_room("Tiles", &stage.stage, tiling.part.mesh.face_count()) {
+                continue;
+            }
             self.scene.surfaces.push(tiles(tiling, &id, &name));
         }
     }
@@ -236,6 +259,9 @@ impl<'a> Builder<'a> {
     fn layouts(&mut self) {
         for (count, (stage, layout)) in self.results.of::<artifacts::QuadLayout>().into_iter().enumerate() {
             let mesh = &layout.part.mesh;
+            if !self.has_room("Quadrilaterals", &stage.stage, mesh.face_count()) {
+                continue;
+            }
             let (id, name) = named(count, "quads", "Quadrilaterals", &stage.stage);
             let mut layer = Surface::new(&id, &name, mesh.clone());
             layer.categories.push(by_id(mesh, &layout.quad_of_face, "Quadrilaterals", "quadrilateral"));
