@@ -270,6 +270,7 @@ const KNOWN: &[Figure] = &[
 ];
 
 const SECTIONS: &[(&str, &str, &str)] = &[
+    ("limits", "Limits that were set", "In the pipeline, for the surface."),
     ("original", "Mesh as imported", "What the optimizer gave."),
     ("smoothing", "Smoothed mesh", "Measured against the mesh as imported."),
     ("layout", "Quadrilateral layout", "How the surface was divided before it became patches."),
@@ -535,6 +536,29 @@ impl Walk<'_> {
         }
     }
 
+    /// The limits that were set in the pipeline: each names its figure.
+    fn limits(&mut self, items: &[Value]) {
+        for item in items {
+            let path = item["figure"].as_str().unwrap_or_default();
+            let known = KNOWN.iter().find(|known| known.path == path);
+            let (name, unit) = unit(path.rsplit('.').next().unwrap_or_default());
+            let state = match item["kept"].as_bool() {
+                Some(true) => State::Kept,
+                Some(false) => State::Broken,
+                None => State::Free,
+            };
+            self.findings.push(Finding {
+                path: path.to_owned(),
+                words: known.map_or_else(|| humanized(name), |known| known.words.to_owned()),
+                short: "Limit that was set".into(),
+                value: with_unit(&item["value"], unit),
+                limit: item.get("limit").map(|limit| format!("at most {}", with_unit(limit, unit))),
+                state,
+                at: point(item.get("at")),
+            });
+        }
+    }
+
     /// How many holes have the diameter they had.
     fn holes(&mut self, path: &str, holes: &[Value], before: &str, after: &str, words: &str) {
         let known: Vec<(f64, f64)> =
@@ -567,6 +591,8 @@ pub fn sections(report: &Value) -> Vec<Section> {
         let mut walk = Walk { report, findings: Vec::new(), tables: Vec::new() };
         match value {
             Value::Object(inner) => walk.object(key, inner),
+            Value::Array(items) if key == "limits" => walk.limits(items),
+            Value::Array(items) if items.iter().any(Value::is_object) => walk.table(key, key, items),
             other => walk.figure(key.clone(), key, other, None),
         }
         let known = SECTIONS.iter().find(|(known, ..)| known == key);
@@ -589,7 +615,7 @@ pub fn missing(report: &Value) -> Vec<&'static str> {
     if report.get("original").is_none() {
         return Vec::new();
     }
-    let named = SECTIONS.iter().filter(|(key, ..)| *key != "stiffness");
+    let named = SECTIONS.iter().filter(|(key, ..)| !["stiffness", "limits"].contains(key));
     named.filter(|(key, ..)| report.get(key).is_none_or(Value::is_null)).map(|(_, title, _)| *title).collect()
 }
 
@@ -660,6 +686,17 @@ mod tests {
         assert_eq!(new.findings[1].value, "unknown");
         assert_eq!(new.tables[0].columns, ["A, mm", "Point", "B"]);
         assert_eq!(new.tables[0].rows[0].1, Some([0.0, 0.0, 1.0]));
+    }
+
+    #[test]
+    fn limits_of_the_pipeline_are_figures_with_a_mark() {
+        let limit = |value: f64, kept: bool| json!({"figure": "surface.deviation.max_mm", "value": value, "limit": 0.5, "kept": kept, "at": [1.0, 2.0, 3.0]});
+        let sections = sections(&json!({"limits": [limit(0.25, true), limit(0.75, false)]}));
+        let findings = &sections[0].findings;
+        assert_eq!(findings[0].words, "Largest distance from the smoothed mesh");
+        assert_eq!((findings[0].state, findings[1].state), (State::Kept, State::Broken));
+        assert_eq!((findings[1].value.as_str(), findings[1].at), ("0.7500 mm", Some([1.0, 2.0, 3.0])));
+        assert_eq!(findings[1].limit.as_deref(), Some("at most 0.5000 mm"));
     }
 
     #[test]
