@@ -23,7 +23,7 @@ pub enum ImportError {
         path: String,
     },
     /// Neither the content nor the ending is that of a known format.
-    #[error("{file}: this is not a mesh that can be read; STL, OFF, OBJ and PLY can")]
+    #[error("{file}: this is not a mesh that can be read; STL, OFF, OBJ, PLY, VTU and VTI can")]
     UnknownFormat {
         /// The file.
         file: String,

@@ -1,10 +1,10 @@
 //! Which reader a file goes to: by content first, then by ending.
 
 use super::soup::{Soup, lines, words};
-use super::{ImportError, obj, off, ply, stl};
+use super::{ImportError, ImportOptions, density, obj, off, ply, stl, vtk};
 
 /// Parses a file of any known format.
-pub(super) fn parse(file: &str, bytes: &[u8]) -> Result<Soup, ImportError> {
+pub(super) fn parse(file: &str, bytes: &[u8], options: &ImportOptions) -> Result<Soup, ImportError> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let ending = file.rsplit_once('.').map_or(String::new(), |(_, e)| e.to_ascii_lowercase());
     if text.trim_ascii().is_empty() {
@@ -17,6 +17,9 @@ pub(super) fn parse(file: &str, bytes: &[u8]) -> Result<Soup, ImportError> {
     let start = text.trim_ascii_start();
     if ["ply\n", "ply\r", "ply "].iter().any(|magic| start.starts_with(magic.as_bytes())) {
         return ply::parse(file, start);
+    }
+    if vtk::looks_like(start) {
+        return density::parse(file, start, options);
     }
     if off::has_header(start) {
         return off::parse(file, text);

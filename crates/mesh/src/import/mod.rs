@@ -1,6 +1,7 @@
 //! Reads a mesh file and makes a closed, oriented, manifold [`Part`] of it, or says why it can not.
 //!
-//! Formats: STL (binary and ASCII), OFF, OBJ, PLY, told apart by content first and by ending second.
+//! Formats: STL (binary and ASCII), OFF, OBJ, PLY, and density fields in VTU and VTI, told apart by content first and by ending
+//! second.
 //!
 //! Guarantees of a returned part: every edge has two faces, every vertex one fan, faces look out of the material,
 //! coordinates are finite and in millimetres, each kept shell encloses volume, and every vertex and every label is
@@ -23,6 +24,7 @@
 
 mod border;
 mod crossing;
+mod density;
 mod draft;
 mod error;
 mod format;
@@ -36,11 +38,12 @@ mod shells;
 mod slivers;
 mod soup;
 mod stl;
+mod vtk;
 
 pub use error::ImportError;
-pub use options::{Components, ImportOptions, NonDesignRegion, Units};
+pub use options::{Components, ImportOptions, Inside, NonDesignRegion, Units};
 
-use crate::{ImportRecord, Part};
+use crate::{Design, ImportRecord, Part};
 use std::collections::BTreeMap;
 use topipe_progress::Progress;
 
@@ -81,9 +84,12 @@ pub fn read_source(
     let file = source.name;
     const STEPS: u64 = 4;
     progress.step(0, STEPS, "reading");
-    let soup = format::parse(file, source.bytes)?;
+    let mut soup = format::parse(file, source.bytes, options)?;
+    let own_labels = soup.non_design.take();
     let labels = match source.labels {
-        None => None,
+        // A field may bring labels of its own.
+        None => own_labels
+            .map(|list| list.iter().map(|&n| if n { Design::NonDesign } else { Design::Design }).collect()),
         Some((name, bytes)) => {
             let labels = labels::parse(name, bytes)?;
             if labels.len() != soup.face_count {

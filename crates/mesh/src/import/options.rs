@@ -77,6 +77,17 @@ pub enum NonDesignRegion {
     },
 }
 
+/// On which side of the threshold of a field the material is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Inside {
+    /// Where the field is larger: densities.
+    #[default]
+    Above,
+    /// Where it is smaller: distances that are negative inside.
+    Below,
+}
+
 /// Options of the import stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -97,6 +108,12 @@ pub struct ImportOptions {
     /// Slack of the regions, as a fraction of the bounding box's diagonal. 1e-6 (default) covers the rounding of
     /// coordinates to 32-bit floats, 6e-8 of the largest coordinate, and of decimals with six digits.
     pub region_tolerance: f64,
+    /// VTU and VTI: the field that says where material is; by default `density`, or the only one there is.
+    pub field: Option<String>,
+    /// VTU and VTI: material is where the field has at least this value; by default 0.5, and 0 for distances.
+    pub threshold: Option<f64>,
+    /// VTU and VTI: whether material is `above` the threshold (default) or `below`.
+    pub inside: Inside,
 }
 
 impl Default for ImportOptions {
@@ -109,6 +126,9 @@ impl Default for ImportOptions {
             allow_self_intersection: false,
             non_design: Vec::new(),
             region_tolerance: 1e-6,
+            field: None,
+            threshold: None,
+            inside: Inside::default(),
         }
     }
 }
@@ -139,6 +159,9 @@ impl ImportOptions {
                 "region_tolerance",
                 format!("must lie between 0 and 0.1 of the diagonal, not {}", self.region_tolerance),
             ));
+        }
+        if let Some(threshold) = self.threshold.filter(|t| !t.is_finite()) {
+            return Some(("threshold", format!("must be a number, not {threshold}")));
         }
         for (k, region) in self.non_design.iter().enumerate() {
             let problem = match region {

@@ -18,6 +18,8 @@ pub(super) struct Soup {
     /// Faces in the file.
     pub(super) face_count: usize,
     pub(super) repairs: Vec<Repair>,
+    /// Whether each face of the file is non-design, where the file says so.
+    pub(super) non_design: Option<Vec<bool>>,
 }
 
 impl Soup {

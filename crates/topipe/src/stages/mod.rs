@@ -55,6 +55,7 @@ mod tests {
             (Value::String(value), _) => {
                 (*variants.iter().find(|variant| **variant != format!("{value:?}")).unwrap()).into()
             }
+            (Value::Null, "string") => "\"another\"".into(),
             (Value::Null, "boolean") => "true".into(),
             (Value::Null, "integer") => "7".into(),
             (Value::Null, "number") => "7.5".into(),
