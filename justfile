@@ -104,3 +104,9 @@ smoothing-peers *options:
     test -d target/smoothing-peers || (python3 -m venv target/smoothing-peers && \
         target/smoothing-peers/bin/pip install -q trimesh scipy pymeshlab pyvista)
     target/smoothing-peers/bin/python crates/smoothing/benches/peers.py {{options}}
+
+# Time of an elastic solution beside pyMOTO on the same grid.
+stiffness-peer cells="16000":
+    cargo build --release -p topipe-fem --example speed
+    test -x target/pymoto/bin/python || (python3 -m venv target/pymoto && target/pymoto/bin/pip install -q pymoto==2.0.1)
+    target/pymoto/bin/python benchmarks/stiffness.py target/release/examples/speed --cells {{cells}}
