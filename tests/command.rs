@@ -752,6 +752,75 @@ fn killed_runs_leave_nothing_that_misleads_the_next_one() {
     assert_eq!(shop.read("topipe-out/box/report.json"), clean.read("topipe-out/box/report.json"));
 }
 
+/// A long fit that dies near its end is taken up there: what was finished is found again, plan says so beforehand, and
+/// the surface is the one of a run that was left alone.
+#[cfg(unix)]
+#[test]
+fn a_fit_killed_near_its_end_is_taken_up_there() {
+    const PIPELINE: &str = r#"
+[stage.mesh]
+kind = "import"
+path = "part.stl"
+[stage.smooth]
+kind = "smoothing"
+input = "mesh"
+[stage.tiles]
+kind = "tiling"
+input = "smooth"
+[stage.quads]
+kind = "quad-matching"
+input = "tiles"
+[stage.fit]
+kind = "spline-fit"
+input = "quads"
+refinements = 0
+[export]
+"part.step" = "fit"
+"#;
+    let shop = || {
+        let shop = Workshop { folder: tempfile::tempdir().unwrap() };
+        let part = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/y-form/y-form.stl");
+        std::fs::copy(part, shop.path("part.stl")).unwrap();
+        shop.write("box.toml", PIPELINE);
+        shop
+    };
+    let killed = shop();
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
+        .current_dir(killed.folder.path())
+        .args(["run", "box.toml", "--json"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let lines = std::io::BufRead::lines(std::io::BufReader::new(child.stdout.take().unwrap()));
+    let mut reached = None;
+    for line in lines {
+        let event: Value = serde_json::from_str(&line.unwrap()).unwrap();
+        let number = |name: &str| event[name].as_u64().unwrap_or(0);
+        if event["stage"] == "fit" && event["what"] == "patches" && 10 * number("done") >= 8 * number("total")
+        {
+            reached = Some((number("done"), number("total")));
+            break;
+        }
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let (done, total) = reached.expect("the fit tells how far it is");
+    let plan = killed.topipe(&["plan", "box.toml"]);
+    assert!(plan.stdout.contains(&format!("of {total} patches")), "{}", plan.stdout);
+    let ended = killed.topipe(&["run", "box.toml", "--json"]);
+    assert_eq!(ended.code, 0, "{}", ended.stderr);
+    let events: Vec<Value> = ended.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let units = events.iter().find(|e| e["event"] == "stage-units" && e["stage"] == "fit").unwrap();
+    let (reused, computed) = (units["reused"].as_u64().unwrap(), units["computed"].as_u64().unwrap());
+    assert_eq!(reused + computed, total);
+    // At most the patches in the making are lost, one a thread.
+    assert!(reused + 64 >= done, "{reused} of {done} found again");
+    let clean = shop();
+    assert_eq!(clean.topipe(&["-q", "run", "box.toml"]).code, 0);
+    assert_eq!(killed.read("topipe-out/box/part.step"), clean.read("topipe-out/box/part.step"));
+}
+
 #[test]
 fn processes_on_one_cache_compute_each_result_once() {
     let shop = Workshop::new();

@@ -4,7 +4,7 @@ use crate::parameters::Continuity;
 use crate::samples::{PatchSamples, faces_by_quad, sample};
 use crate::{Parameters, SplineFitError, SplineSurface};
 use rayon::prelude::*;
-use topipe_progress::{Progress, Units};
+use topipe_progress::{Progress, UnitKey, Units};
 use topipe_quad_matching::QuadLayout;
 
 /// Fits a spline surface to a layout; see the crate's documentation.
@@ -16,10 +16,29 @@ pub fn fit(
     units: &Units,
     progress: &Progress,
 ) -> Result<SplineSurface, SplineFitError> {
+    let samples = samples(layout, parameters)?;
+    match parameters.continuity {
+        Continuity::Position => crate::position_fit::fit(layout, samples, parameters, progress),
+        Continuity::Tangent => crate::tangent_fit::fit(layout, samples, parameters, units, progress),
+    }
+}
+
+/// The keys of the patches that [`fit`] begins with, found in a small part of its time; none without common tangents.
+/// Patches that are refined have other keys later, which depend on what comes of the first.
+pub fn first_patches(layout: &QuadLayout, parameters: &Parameters) -> Result<Vec<UnitKey>, SplineFitError> {
+    match parameters.continuity {
+        Continuity::Position => Ok(Vec::new()),
+        Continuity::Tangent => {
+            crate::tangent_fit::first_patches(layout, &samples(layout, parameters)?, parameters)
+        }
+    }
+}
+
+fn samples(layout: &QuadLayout, parameters: &Parameters) -> Result<Vec<PatchSamples>, SplineFitError> {
     parameters.basis()?;
     check(layout)?;
     let faces = faces_by_quad(layout);
-    let samples: Vec<PatchSamples> = (0..layout.quads.len())
+    (0..layout.quads.len())
         .into_par_iter()
         .map(|quad| {
             sample(layout, quad, &faces[quad])
@@ -28,11 +47,7 @@ pub fn fit(
         // The first error in the order of the quads, for any number of threads.
         .collect::<Vec<Result<PatchSamples, SplineFitError>>>()
         .into_iter()
-        .collect::<Result<_, _>>()?;
-    match parameters.continuity {
-        Continuity::Position => crate::position_fit::fit(layout, samples, parameters, progress),
-        Continuity::Tangent => crate::tangent_fit::fit(layout, samples, parameters, units, progress),
-    }
+        .collect()
 }
 
 /// The parts of a layout's guarantees on which indexing relies.

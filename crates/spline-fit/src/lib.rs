@@ -59,7 +59,7 @@ mod unknowns;
 pub use basis::Basis;
 pub use edge_curve::CurvePoint;
 pub use error::SplineFitError;
-pub use fit::fit;
+pub use fit::{first_patches, fit};
 pub use parameters::{Continuity, Parameters};
 pub use shells::{Shell, shells};
 pub use surface::{AnalyticFace, CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface, SurfacePoint};

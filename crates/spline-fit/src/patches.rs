@@ -32,6 +32,32 @@ pub(crate) struct Patches<'a> {
 }
 
 impl Patches<'_> {
+    /// Borders of all patches, with at least `spans` along each edge, and normals at their corners.
+    pub(crate) fn given(&self, network: &Network, spans: &[usize]) -> (Vec<[Border; 4]>, Vec<[DVec3; 4]>) {
+        let setting = self.setting;
+        let borders = (0..setting.layout.quads.len())
+            .into_par_iter()
+            .map(|quad| borders_of(setting, quad, &network.curves, spans))
+            .collect();
+        let normal = |sector: u32| network.frames.frames[sector as usize].surface.normal;
+        (borders, setting.sectors.at.iter().map(|sectors| sectors.map(normal)).collect())
+    }
+
+    /// The keys under which the patches are kept.
+    pub(crate) fn keys(
+        &self,
+        samples: &[PatchSamples],
+        borders: &[[Border; 4]],
+        corners: &[[DVec3; 4]],
+    ) -> Vec<UnitKey> {
+        samples
+            .par_iter()
+            .zip(borders)
+            .zip(corners)
+            .map(|((samples, borders), corners)| unit::key(samples, borders, corners, self.parameters))
+            .collect()
+    }
+
     /// The insides of all patches, with at least `spans` along each edge; the samples end at their foot points. What was
     /// `before` is taken over where nothing has changed.
     pub(crate) fn fit(
@@ -43,26 +69,8 @@ impl Patches<'_> {
     ) -> Result<Vec<Fitted>, SplineFitError> {
         let Self { setting, parameters, units, progress } = *self;
         let layout = setting.layout;
-        let borders: Vec<[Border; 4]> = (0..layout.quads.len())
-            .into_par_iter()
-            .map(|quad| borders_of(setting, quad, &network.curves, spans))
-            .collect();
-        let corners: Vec<[DVec3; 4]> = setting
-            .sectors
-            .at
-            .iter()
-            .map(|sectors| sectors.map(|sector| network.frames.frames[sector as usize].surface.normal))
-            .collect();
-        let keys: Vec<UnitKey> = if units.are_kept() {
-            samples
-                .par_iter()
-                .zip(&borders)
-                .zip(&corners)
-                .map(|((samples, borders), corners)| unit::key(samples, borders, corners, parameters))
-                .collect()
-        } else {
-            Vec::new()
-        };
+        let (borders, corners) = self.given(network, spans);
+        let keys = if units.are_kept() { self.keys(samples, &borders, &corners) } else { Vec::new() };
         units.announce("patches", &keys);
         let most = borders.iter().flatten().map(|b| b.spans).max().unwrap_or(1);
         let grams: Vec<Gram> = (0..=most.ilog2()).map(|k| Gram::new(&hermite::basis(1 << k))).collect();

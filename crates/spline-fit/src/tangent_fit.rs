@@ -17,7 +17,7 @@ use crate::samples::PatchSamples;
 use crate::setting::Setting;
 use crate::simplify::simplify;
 use crate::{CurveShape, EdgeCurve, Parameters, Patch, PatchSide, SplineFitError, SplineSurface};
-use topipe_progress::{Progress, Units};
+use topipe_progress::{Progress, UnitKey, Units};
 use topipe_quad_matching::QuadLayout;
 
 /// Fits a surface whose patches meet with common tangents off the features.
@@ -53,6 +53,22 @@ pub(crate) fn fit(
         }
         before = fitted;
     }
+}
+
+/// The keys of the patches of the first round, before any knots are inserted.
+pub(crate) fn first_patches(
+    layout: &QuadLayout,
+    samples: &[PatchSamples],
+    parameters: &Parameters,
+) -> Result<Vec<UnitKey>, SplineFitError> {
+    let progress = Progress::silent();
+    let mut setting = Setting::new(layout)?;
+    setting.make_corners(samples, parameters.spans as usize, &progress);
+    let refinement = Refinement::new(&setting, parameters);
+    let network = network(&setting, samples, refinement.spans())?;
+    let patches = Patches { setting: &setting, parameters, units: &Units::none(), progress: &progress };
+    let (borders, corners) = patches.given(&network, refinement.patch_spans());
+    Ok(patches.keys(samples, &borders, &corners))
 }
 
 fn assemble(setting: &Setting<'_>, network: &Network, fitted: &[Fitted]) -> SplineSurface {

@@ -2,8 +2,8 @@
 
 use super::bad_value;
 use crate::artifacts;
-use topipe_engine::{BadValue, InputPort, Stage, StageContext, StageError};
-use topipe_spline_fit::{Parameters, SplineFitError, fit};
+use topipe_engine::{BadValue, InputPort, NeededUnits, Stage, StageContext, StageError};
+use topipe_spline_fit::{Parameters, SplineFitError, first_patches, fit};
 
 /// Fits a B-spline surface to a layout.
 pub(super) struct SplineFit;
@@ -35,10 +35,26 @@ impl Stage for SplineFit {
         parameters: &Parameters,
     ) -> Result<topipe_spline_fit::SplineSurface, StageError> {
         let layout = context.input::<artifacts::QuadLayout>("input")?;
-        fit(&layout, parameters, context.units(), context.progress()).map_err(|error| match error {
-            SplineFitError::Interrupted(_) => StageError::Interrupted,
-            SplineFitError::Parameter { .. } => StageError::BadParameter(error.to_string()),
-            error => StageError::Failed(error.to_string()),
-        })
+        fit(&layout, parameters, context.units(), context.progress()).map_err(failure)
+    }
+
+    const NAMES_UNITS: bool = true;
+
+    fn needed_units(
+        &self,
+        context: &StageContext<'_>,
+        parameters: &Parameters,
+    ) -> Result<Vec<NeededUnits>, StageError> {
+        let layout = context.input::<artifacts::QuadLayout>("input")?;
+        let keys = first_patches(&layout, parameters).map_err(failure)?;
+        Ok(vec![NeededUnits { what: "patches".into(), keys }])
+    }
+}
+
+fn failure(error: SplineFitError) -> StageError {
+    match error {
+        SplineFitError::Interrupted(_) => StageError::Interrupted,
+        SplineFitError::Parameter { .. } => StageError::BadParameter(error.to_string()),
+        error => StageError::Failed(error.to_string()),
     }
 }
