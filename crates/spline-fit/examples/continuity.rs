@@ -41,6 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         &topipe_tiling::Parameters {
             least_region: std::env::var("TP_LEAST").ok().and_then(|s| s.parse().ok()).unwrap_or(0.5),
             normal_cone: std::env::var("TP_CONE").ok().and_then(|s| s.parse().ok()).unwrap_or(100.0),
+            bend: std::env::var("TP_BEND").ok().and_then(|s| s.parse().ok()).unwrap_or(0.0),
             ..Default::default()
         },
         &silent,

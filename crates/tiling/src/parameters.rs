@@ -37,7 +37,20 @@ pub struct Parameters {
     /// Tiles whose normals deviate from their mean by more than this are split, degrees; the quads of a tile see about
     /// half of it. Bordered tiles only.
     pub normal_cone: f64,
+    /// Tiles are smaller where the normals of the smoothed mesh turn by more than this over a tile, degrees; 0 for tiles
+    /// of one size. Bordered tiles only.
+    pub bend: f64,
 }
+
+/// Patches, quads with a corner outside 45 to 135 degrees of all corners, patches farther than a thousandth of the diagonal
+/// from some point of the mesh, and the largest distance (fit with one refinement):
+///
+/// | bend | support | bracket |
+/// |---|---|---|
+/// | 0 | 811; 5.1 %; 86; 0.89 mm | 1,079; 6.8 %; 178; 4.7 mm |
+/// | 150 | 778; 6.1 %; 52; 0.57 mm | 1,409; 4.4 %; 139; 2.9 mm |
+/// | 100 | 1,040; 4.3 %; 25; 0.32 mm | 1,983; 2.7 %; 82; 1.6 mm |
+const DEFAULT_BEND: f64 = 100.0;
 
 impl Default for Parameters {
     fn default() -> Self {
@@ -50,6 +63,7 @@ impl Default for Parameters {
             faces_per_tile: 24,
             least_region: 0.5,
             normal_cone: 100.0,
+            bend: DEFAULT_BEND,
         }
     }
 }
@@ -72,6 +86,9 @@ impl Parameters {
         }
         if !(20.0..=180.0).contains(&self.normal_cone) {
             return refuse("normal_cone", self.normal_cone.to_string(), "20 to 180 degrees");
+        }
+        if !(0.0..=360.0).contains(&self.bend) {
+            return refuse("bend", self.bend.to_string(), "0 to 360 degrees");
         }
         if (1..4).contains(&self.tiles) {
             return refuse("tiles", self.tiles.to_string(), "0, or at least 4");

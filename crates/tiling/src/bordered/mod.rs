@@ -20,6 +20,7 @@ mod polygons;
 mod regions;
 mod repair;
 mod sites;
+mod sizes;
 mod strips;
 mod surface;
 
@@ -92,8 +93,12 @@ pub(crate) fn tile(
     } else {
         parameters.tile_size * wall
     };
+    let bends = match parameters.bend {
+        bend if bend > 0.0 => sizes::factors(&refiner, &region_of_face, spacing, bend.to_radians()),
+        _ => vec![1.0; part.mesh.face_count()],
+    };
     let factor = |f: usize| sizes.and_then(|s| s.get(f)).copied().filter(|s| *s > 0.0).unwrap_or(1.0);
-    let size: Vec<f64> = (0..part.mesh.face_count()).map(|f| spacing * factor(f)).collect();
+    let size: Vec<f64> = (0..part.mesh.face_count()).map(|f| spacing * factor(f) * bends[f]).collect();
     let mut surface = Surface::new(refiner, region_of_face, size);
     surface.densify(parameters.faces_per_tile, progress)?;
     let segments = if parameters.follow_features { barriers::segments(&mut surface) } else { Vec::new() };

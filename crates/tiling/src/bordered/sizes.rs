@@ -1,0 +1,115 @@
+//! Smaller tiles where the surface bends: sizes from the curvature of the mesh.
+//!
+//! A patch follows a surface whose normals turn little over it. So the size of tiles is limited to the length over which
+//! normals turn by a given angle, wherever that is less than the size asked for. Normals are averaged over neighbours
+//! first, or the noise of the mesh would pass for curvature; edges that are features do not count, nor do faces that
+//! are no tile's. Sizes then grow by at most [`GRADE`] of the distance, so that neighbouring tiles differ little.
+
+use topipe_mesh::refine::Refiner;
+use topipe_mesh::{DVec3, FaceId, HalfEdgeId, RegionId};
+
+/// Rounds in which normals are averaged with those of their neighbours: waves of two or three faces fade.
+const ROUNDS: usize = 4;
+
+/// How fast sizes may grow with the distance.
+const GRADE: f64 = 0.5;
+
+/// Smallest size over the one asked for: with a quarter the narrow pits of the bracket are still smaller than a patch.
+const LEAST: f64 = 0.1;
+
+/// The size over `spacing` of each face, at most 1, such that averaged normals turn by about `angle`, radians, over it.
+pub(crate) fn factors(refiner: &Refiner, region: &[RegionId], spacing: f64, angle: f64) -> Vec<f64> {
+    let part = refiner.part();
+    let mesh = &part.mesh;
+    let count = mesh.face_count();
+    let centers: Vec<DVec3> =
+        mesh.faces().map(|f| mesh.corners(f).into_iter().sum::<DVec3>() / 3.0).collect();
+    let free = |f: usize| !region[f].is_some();
+    // Neighbours across edges that are not sharp.
+    let beside: Vec<[Option<usize>; 3]> = (0..count)
+        .map(|f| {
+            [0, 1, 2].map(|k| {
+                let h = HalfEdgeId::of(FaceId::new(f), k);
+                let g = refiner.twin(h).face().index();
+                (free(f) && free(g) && refiner.feature(refiner.origin(h), refiner.target(h)).is_none())
+                    .then_some(g)
+            })
+        })
+        .collect();
+    let areas: Vec<DVec3> = mesh.faces().map(|f| mesh.area_vector(f)).collect();
+    let mut normals = areas.clone();
+    for _ in 0..ROUNDS {
+        normals = (0..count)
+            .map(|f| normals[f] + beside[f].iter().flatten().map(|&g| normals[g]).sum::<DVec3>())
+            .map(|n| n / 4.0)
+            .collect();
+    }
+    let mut factors: Vec<f64> = (0..count)
+        .map(|f| {
+            let turn = |&g: &usize| {
+                let (a, b) = (normals[f], normals[g]);
+                let distance = centers[f].distance(centers[g]);
+                if distance > 0.0 { a.cross(b).length().atan2(a.dot(b)) / distance } else { 0.0 }
+            };
+            // The mean over the edges: thin faces are near their neighbours, and so their quotients are uncertain.
+            let turns: Vec<f64> = beside[f].iter().flatten().map(turn).collect();
+            let mean = turns.iter().sum::<f64>() / turns.len().max(1) as f64;
+            (angle / (mean * spacing).max(f64::MIN_POSITIVE)).clamp(LEAST, 1.0)
+        })
+        .collect();
+    // From the smallest on: each face gives its neighbours their limit once.
+    let mut order: std::collections::BTreeSet<(u64, usize)> =
+        (0..count).filter(|&f| factors[f] < 1.0).map(|f| (factors[f].to_bits(), f)).collect();
+    while let Some((bits, f)) = order.pop_first() {
+        if bits != factors[f].to_bits() {
+            continue;
+        }
+        for g in beside[f].iter().flatten().copied() {
+            let limit = factors[f] + GRADE * centers[f].distance(centers[g]) / spacing;
+            if limit < factors[g] {
+                factors[g] = limit;
+                order.insert((limit.to_bits(), g));
+            }
+        }
+    }
+    factors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use topipe_mesh::{Part, TriangleMesh};
+
+    /// A torus: the tube bends three times as fast as the ring, a part in metres like one in millimetres.
+    #[test]
+    fn sizes_follow_the_narrower_bend_at_any_scale() {
+        let (m, n) = (96u32, 48u32);
+        let turn = |k: u32, of: u32| f64::from(k) / f64::from(of) * std::f64::consts::TAU;
+        for scale in [1e-3, 1.0, 1e3] {
+            let points = (0..m * n)
+                .map(|k| {
+                    let ((s, c), (t, d)) = (turn(k / n, m).sin_cos(), turn(k % n, n).sin_cos());
+                    [(3.0 + d) * c, (3.0 + d) * s, t].map(|x| scale * x)
+                })
+                .collect();
+            let at = |i: u32, j: u32| (i % m) * n + j % n;
+            let quads = (0..m).flat_map(|i| (0..n).map(move |j| (i, j)));
+            let triangles = quads
+                .flat_map(|(i, j)| {
+                    let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                    [[a, b, c], [a, c, d]]
+                })
+                .collect();
+            let part = Part::new(TriangleMesh::from_arrays(points, triangles));
+            let refiner = Refiner::new(&part).unwrap();
+            let region = vec![RegionId::NONE; part.mesh.face_count()];
+            // Two radii of the tube: over them its normals turn by two, at most.
+            let found = factors(&refiner, &region, 2.0 * scale, 1.0);
+            let mean = found.iter().sum::<f64>() / found.len() as f64;
+            assert!((0.5..1.0).contains(&mean), "{mean}");
+            assert!(found.iter().all(|f| (0.4..=1.0).contains(f)), "{found:?}");
+            // Where nothing bends that much, sizes stay.
+            assert!(factors(&refiner, &region, 0.2 * scale, 1.0).iter().all(|&f| f == 1.0));
+        }
+    }
+}
