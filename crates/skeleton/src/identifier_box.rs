@@ -11,12 +11,18 @@
 //!   of a slanted beam is wider than its cut.
 //! - Each direction of each junction is tried once, each branch has a bounded number of boxes and there are at most
 //!   as many junctions as nodes, so the method ends on any mesh.
-//! - A later point closer than `l_b` to a point of another branch joins it, which the thesis asks of first points only.
-//! - "If this skeletal point lies within the design region": so must the middle of the way to it; otherwise
-//!   the branch ends before it.
-//! - A branch that joins another after one or two points is that branch once more, and goes.
+//! - A box may hold nodes of several beams at once, whose mean lies between them. Each connected set of nodes in a box is
+//!   looked at on its own: a branch goes on to the set that continues its last one; where two do it forks, which is a junction
+//!   although nothing became wider; and a survey starts a branch for each.
+//! - Where beams meet at a small angle the box becomes wider while there is still a gap between them, and its mean lies in the
+//!   gap. The junction is then the first box further on whose mean lies in the material.
+//! - "If the first point of a branch is near another point" is asked of nodes: a box of whose nodes more than half have been
+//!   collected before is on a known way. It joins that way where this closes a loop, and else the branch goes.
+//! - "If this skeletal point lies within the design region": so must the way to it.
+//! - Loops that go around nothing are cut afterwards (`cycles`).
 //! - A branch that reaches the nodes of an interface ends there.
 
+mod cycles;
 mod march;
 mod scan;
 
@@ -39,6 +45,12 @@ struct Junction {
     used: Vec<Direction>,
 }
 
+/// A junction holds at most so many boxes in a direction (figure 3.28).
+const MOST_JUNCTION_BOXES: usize = 8;
+
+/// Owner of a node that no box has held yet.
+const NOBODY: u32 = u32::MAX;
+
 struct State<'a> {
     parameters: &'a Parameters,
     scanner: Scanner<'a>,
@@ -46,6 +58,8 @@ struct State<'a> {
     sets: &'a Sets,
     skeleton: Skeleton,
     junctions: Vec<Junction>,
+    /// The point of the first box that held a node.
+    owner: Vec<u32>,
     most_steps: usize,
     unfinished: usize,
 }
@@ -60,9 +74,11 @@ pub(crate) fn skeletonize(
     if sets.interfaces.is_empty() {
         return Err(SkeletonError::NoInterface);
     }
+    let scanner = Scanner::new(part, connectivity);
     let mut state = State {
         parameters,
-        scanner: Scanner::new(part, connectivity),
+        owner: vec![NOBODY; scanner.node_count()],
+        scanner,
         inside: Inside::new(&part.mesh),
         sets,
         skeleton: Skeleton::new(Method::IdentifierBox),
@@ -134,7 +150,9 @@ impl State<'_> {
         let mut start = row;
         let face = ring.front(direction);
         start.set_slab(direction, face, step);
-        self.march(march::Start { from, direction, step, first_box: start, previous, origin: None });
+        for first in self.continued(self.scanner.scan(&start, direction), from) {
+            self.march(march::Start { from, direction, step, first, previous, origin: None });
+        }
     }
 
     /// Sections 3.4.3.1 to 3.4.3.3: the survey of six directions, and a branch in each that has nodes.
@@ -147,47 +165,65 @@ impl State<'_> {
             let step = junction.step;
             let mut bounds = junction.bounds;
             // Boxes that are still as wide as the junction belong to it (figure 3.28).
-            let mut placed = None;
-            for _ in 0..8 {
+            let point = junction.point;
+            let mut placed = Vec::new();
+            for _ in 0..MOST_JUNCTION_BOXES {
                 let mut next = bounds;
                 next.set_slab(direction, bounds.front(direction), step);
-                let Some(found) = self.scanner.scan(&next, direction) else { break };
+                let sets = self.continued(self.scanner.scan(&next, direction), point);
+                let mut now = Aabb::EMPTY;
+                sets.iter().for_each(|s| now.merge(&s.bounds));
+                if sets.is_empty() {
+                    break;
+                }
                 let (u, v) = direction.across();
-                let (now, before) = (found.bounds.widths(), bounds.widths());
+                let (now, before) = (now.widths(), bounds.widths());
                 let narrow = now[u] * self.parameters.junction_ratio < before[u]
                     || now[v] * self.parameters.junction_ratio < before[v];
-                placed = Some(next);
-                if narrow {
+                let forked = sets.len() > 1;
+                placed = sets;
+                if narrow || forked {
                     break;
                 }
                 bounds.extend_to(direction, next.front(direction));
             }
             // A vacant box is tried again at twice its size (figure 3.35).
             let mut step_used = step;
-            if placed.is_none() {
+            if placed.is_empty() {
                 let mut wide = self.junctions[k].bounds;
                 wide.grow(step / 2.0, (direction.axis + 1) % 3);
                 wide.grow(step / 2.0, (direction.axis + 2) % 3);
                 let front = wide.front(direction);
                 wide.set_slab(direction, front, 2.0 * step);
-                if self.scanner.scan(&wide, direction).is_some() {
-                    placed = Some(wide);
-                    step_used = 2.0 * step;
-                }
+                placed = self.continued(self.scanner.scan(&wide, direction), point);
+                step_used = 2.0 * step;
             }
-            let Some(mut first_box) = placed else { continue };
-            let front = first_box.back(direction);
-            first_box.set_slab(direction, front, step_used);
+            if placed.is_empty() {
+                continue;
+            }
             let junction = &mut self.junctions[k];
             junction.used.push(direction);
             let (from, previous) = (junction.point, junction.bounds);
-            self.march(march::Start { from, direction, step, first_box, previous, origin: Some(k) });
+            for first in placed {
+                self.march(march::Start {
+                    from,
+                    direction,
+                    step: step_used,
+                    first,
+                    previous,
+                    origin: Some(k),
+                });
+            }
         }
     }
 
     /// Section 3.4.3.5: what has two branches was no junction. What has one is an end.
     fn close(&mut self) {
         self.skeleton.finish();
+        let spacing = self.junctions.iter().map(|j| j.step).fold(f64::INFINITY, f64::min) / 2.0;
+        if spacing.is_finite() {
+            self.cut_filled_loops(spacing);
+        }
         self.drop_spurs();
         let degrees = self.skeleton.degrees();
         let mut open = 0;

@@ -2,7 +2,7 @@
 //!
 //! Four methods, see [`Method`]:
 //! - `identifier-box`: the axis-aligned box that marches from the borders of design and non-design and collects
-//!   nodes (the thesis on skeletonization of beam-like topology optimization results, section 3.4), in its plain form.
+//!   nodes (the thesis on skeletonization of beam-like topology optimization results, section 3.4).
 //! - `marching-sections`: plane sections across the branches of the Reeb graph of the geodesic distance from the
 //!   interfaces, each point at the area centroid of its section, junctions where the axes of their branches meet.
 //! - `mean-curvature-flow` and `laplacian-contraction`: what the thesis compares with, so that its tables can be
@@ -12,8 +12,8 @@
 //! steps; equal input gives equal bytes for any number of threads. Each interface has one point, and the interfaces
 //! of one non-design part are joined in a `non-design` point.
 //!
-//! Non-guarantees: the identifier box depends on the orientation, misses thin slanted branches and does not promise
-//! a cycle per handle. Parts that are not beams get a skeleton all the same; whether it means anything is for
+//! Non-guarantees: the identifier box depends on the orientation and does not promise a cycle per handle, though it has them
+//! on the four cases of the thesis. Parts that are not beams get a skeleton all the same; whether it means anything is for
 //! validation to say. Holes that a non-design part has of its own, and cavities, are not skeletonized; remarks say so.
 //!
 //! ```
@@ -94,6 +94,14 @@ pub fn skeletonize(
         skeleton
             .remarks
             .insert(0, format!("{patches} design patches enclose no material and were taken for non-design"));
+    }
+    if parameters.method == Method::MarchingSections
+        && !skeleton.sections.iter().any(|s| matches!(s, Section::Plane { .. }))
+    {
+        skeleton.remarks.push(
+            "no branch has a section across it: the part is not made of beams, and its skeleton means little"
+                .to_owned(),
+        );
     }
     for remark in &skeleton.remarks {
         progress.remark(remark);

@@ -48,6 +48,21 @@ fn the_identifier_box_ends_on_every_case() {
 }
 
 #[test]
+fn the_identifier_box_has_a_cycle_per_handle_on_the_cases_of_the_thesis() {
+    for (case, cycles) in [("cantilever", 4), ("cantilever-four", 6), ("y-form", 0), ("monster-lite", 1)] {
+        let skeleton = skeletonize(&fixture(case), &boxes(), &Progress::silent()).unwrap();
+        let measures = skeleton.measures();
+        assert_eq!((measures.components, measures.cycles), (1, cycles), "{case}");
+        // Every interface is reached, and nothing ends anywhere else.
+        let degrees = skeleton.degrees();
+        for (kind, degree) in skeleton.kinds.iter().zip(degrees) {
+            assert!(*kind != PointKind::Interface || degree == 2, "{case}");
+            assert!(*kind != PointKind::End, "{case}");
+        }
+    }
+}
+
+#[test]
 fn bad_input_is_refused_by_name() {
     let refuse = |part: &Part, parameters: &Parameters| {
         skeletonize(part, parameters, &Progress::silent()).expect_err("should be refused")
@@ -151,4 +166,16 @@ fn a_stop_is_an_interruption() {
     let progress = Progress::new(std::sync::Arc::new(Stop));
     let result = skeletonize(&Part::new(bar()), &Parameters::default(), &progress);
     assert!(matches!(result, Err(SkeletonError::Interrupted(_))));
+}
+
+/// The remarks on a part.
+fn remarks(part: &Part, parameters: &Parameters) -> String {
+    skeletonize(part, parameters, &Progress::silent()).unwrap().remarks.join("; ")
+}
+
+#[test]
+fn a_part_without_a_beam_is_called_so() {
+    let ball = common::level_set(DVec3::splat(-1.5), DVec3::splat(1.5), 0.2, |p| p.length() - 1.0);
+    assert!(remarks(&Part::new(ball), &Parameters::default()).contains("not made of beams"));
+    assert!(!remarks(&Part::new(bar()), &Parameters::default()).contains("not made of beams"));
 }

@@ -1,9 +1,19 @@
 //! One branch of the identifier box: from an interface or a junction to wherever it ends.
 
 use super::scan::{Aabb, Direction, Found};
-use super::{Junction, State};
+use super::{Junction, MOST_JUNCTION_BOXES, NOBODY, State};
 use crate::skeleton::{PointKind, Section};
 use glam::DVec3;
+use topipe_mesh::VertexId;
+
+/// A set of nodes of which more than this share has a point already was marched through before.
+const KNOWN: f64 = 0.5;
+
+/// Of several sets ahead, those with less than this share of the largest one's nodes are bumps of the surface.
+const BUMP: f64 = 0.25;
+
+/// Points so many edges apart or fewer are on the same way; more, and a new edge between them closes a loop.
+const SAME_WAY: usize = 4;
 
 /// Where a branch begins.
 pub(super) struct Start {
@@ -12,7 +22,8 @@ pub(super) struct Start {
     pub(super) direction: Direction,
     /// `l_b`.
     pub(super) step: f64,
-    pub(super) first_box: Aabb,
+    /// What its first box holds.
+    pub(super) first: Found,
     /// What the first box is compared with.
     pub(super) previous: Aabb,
     /// The junction it leaves, if it leaves one.
@@ -21,21 +32,26 @@ pub(super) struct Start {
 
 impl State<'_> {
     pub(super) fn march(&mut self, start: Start) {
-        let Start { from, mut direction, step, mut first_box, mut previous, origin } = start;
+        let Start { from, mut direction, step, first, mut previous, origin } = start;
         let first_own = self.skeleton.points.len() as u32;
         let mut last = from;
+        let mut found = first;
         let mut history: Vec<[f64; 3]> = Vec::new();
         for count in 0..self.most_steps {
-            let Some((found, turned)) = self.look(&first_box, direction, &previous, step, count) else {
-                return; // vacant all around: the branch ends here
-            };
-            if turned != direction {
-                history.clear();
-                direction = turned;
-                // Across a turn the widths are those of other axes.
-                previous = found.bounds;
-            }
-            if !self.runs_inside(last, found.point) {
+            // The branch exists already, made in another direction or from its other end.
+            if let Some(p) = self.known(&found, first_own, from) {
+                let target = self.skeleton.points[p as usize];
+                if self.is_near(from, p) {
+                    self.forget(first_own);
+                } else if self.runs_inside(last, target, step) {
+                    self.skeleton.add_edge(last, p);
+                } else if self.runs_inside(last, found.point, step) {
+                    // Around a corner.
+                    let section = Section::Box { low: found.bounds.low, high: found.bounds.high };
+                    let corner = self.skeleton.add_point(found.point, PointKind::Branch, section);
+                    self.skeleton.add_edge(last, corner);
+                    self.skeleton.add_edge(corner, p);
+                }
                 return;
             }
             // An interface ahead.
@@ -43,107 +59,210 @@ impl State<'_> {
                 && self.skeleton.points[k as usize].distance(found.point) < 2.0 * step
             {
                 self.skeleton.add_edge(last, k);
+                self.claim(&found, last);
                 return;
             }
             // Strategies b and c: an existing junction nearby, or its box.
             let hit = self.junctions.iter().position(|junction| {
                 let close = self.skeleton.points[junction.point as usize].distance(found.point) < step;
-                close || junction.bounds.overlaps(&found.bounds)
+                close || self.scanner.any_within(&found, &junction.bounds)
             });
             if let Some(k) = hit.filter(|&k| Some(k) != origin || count > 3) {
-                let junction = self.skeleton.points[self.junctions[k].point as usize];
-                if self.junctions[k].point != last && self.runs_inside(last, junction) {
-                    self.skeleton.add_edge(last, self.junctions[k].point);
+                let point = self.junctions[k].point;
+                if point != last && !self.is_near(from, point) {
+                    self.skeleton.add_edge(last, point);
+                } else if point != from {
+                    self.forget(first_own);
                 }
+                self.claim(&found, point);
                 self.update_junction(k, &found, direction.reversed());
                 return;
             }
-            // The branch exists already, made in another direction.
-            let own = |p: usize| p as u32 >= first_own || p as u32 == from;
-            let near = (0..self.skeleton.points.len())
-                .filter(|&p| !own(p))
-                .map(|p| (self.skeleton.points[p].distance(found.point), p))
-                .min_by(|a, b| a.0.total_cmp(&b.0));
-            if let Some((distance, p)) = near
-                && distance < step
-            {
-                if self.skeleton.points.len() as u32 - first_own <= 2 {
-                    self.forget(first_own);
-                } else if self.runs_inside(last, self.skeleton.points[p]) {
-                    self.skeleton.add_edge(last, p as u32);
+            let widened =
+                (origin.is_none() || count > 0) && self.is_wider(&found, &previous, &history, direction);
+            let inside = self.runs_inside(last, found.point, step);
+            if !inside {
+                if widened {
+                    self.pass_gap(last, &previous, found, direction, step);
                 }
                 return;
             }
-            // Strategy a: wider than before.
-            let widths = found.bounds.widths();
-            let (u, v) = direction.across();
-            let median = |axis: usize| {
-                let mut recent: Vec<f64> = history.iter().rev().take(5).map(|w| w[axis]).collect();
-                recent.sort_by(f64::total_cmp);
-                recent.get(recent.len() / 2).copied()
-            };
-            let wider = |axis: usize| {
-                let limit = self.parameters.junction_ratio;
-                let before = previous.widths()[axis];
-                widths[axis] > limit * before || median(axis).is_some_and(|m| widths[axis] > limit * m)
-            };
-            let is_junction = (origin.is_none() || count > 0) && (wider(u) || wider(v));
-            let kind = if is_junction { PointKind::Junction } else { PointKind::Branch };
             let section = Section::Box { low: found.bounds.low, high: found.bounds.high };
-            let point = self.skeleton.add_point(found.point, kind, section);
+            let point = self.skeleton.add_point(found.point, PointKind::Branch, section);
             self.skeleton.add_edge(last, point);
-            if is_junction {
-                self.junctions.push(Junction {
-                    point,
-                    bounds: found.bounds,
-                    step,
-                    used: vec![direction.reversed()],
-                });
+            self.claim(&found, point);
+            if widened {
+                let mut bounds = found.bounds;
+                if last == from && origin.is_none() {
+                    // Beside an oblique interface branches leave before the first box.
+                    bounds.extend_to(direction.reversed(), previous.back(direction));
+                }
+                self.make_junction(point, bounds, step, direction.reversed());
                 return;
             }
-            history.push(widths.to_array());
+            history.push(found.bounds.widths().to_array());
             last = point;
             previous = found.bounds;
-            first_box = found.bounds;
-            first_box.set_slab(direction, found.bounds.front(direction), step);
+            let mut ahead = found.bounds;
+            ahead.set_slab(direction, found.bounds.front(direction), step);
+            let Some((mut sets, turned)) = self.look(&ahead, direction, &previous, step, last) else {
+                return; // vacant all around: the branch ends here
+            };
+            if sets.len() > 1 {
+                // It forks, without having become wider.
+                self.make_junction(last, previous, step, direction.reversed());
+                return;
+            }
+            found = sets.swap_remove(0);
+            if turned != direction {
+                history.clear();
+                direction = turned;
+                // Across a turn the widths are those of other axes.
+                previous = found.bounds;
+            }
         }
     }
 
-    /// True when the straight way from a point of the skeleton stays in the material.
-    fn runs_inside(&self, from: u32, to: DVec3) -> bool {
-        let start = self.skeleton.points[from as usize];
-        [0.5, 1.0].into_iter().all(|t| self.inside.contains(start.lerp(to, t)))
+    /// The nodes of a wide box lie around a gap: branches that meet further on. The junction is the first box ahead whose point lies
+    /// in the material; without one, the point before.
+    fn pass_gap(&mut self, last: u32, previous: &Aabb, first: Found, direction: Direction, step: f64) {
+        let back = direction.reversed();
+        let mut bounds = first.bounds;
+        bounds.merge(previous);
+        let mut passed = vec![first];
+        for _ in 0..MOST_JUNCTION_BOXES {
+            let mut ahead = passed[passed.len() - 1].bounds;
+            ahead.set_slab(direction, ahead.front(direction), step);
+            let widest = self.scanner.scan(&ahead, direction).into_iter().max_by_key(|s| s.nodes.len());
+            let Some(next) = widest else { break };
+            bounds.merge(&next.bounds);
+            let (at, section) = (next.point, Section::Box { low: next.bounds.low, high: next.bounds.high });
+            passed.push(next);
+            if self.runs_inside(last, at, step) {
+                let point = self.skeleton.add_point(at, PointKind::Branch, section);
+                self.skeleton.add_edge(last, point);
+                passed.iter().for_each(|f| self.claim(f, point));
+                self.make_junction(point, bounds, step, back);
+                return;
+            }
+        }
+        self.claim(&passed[0], last);
+        let mut bounds = passed[0].bounds;
+        bounds.merge(previous);
+        self.make_junction(last, bounds, step, back);
     }
 
-    /// Takes back the points from `first` on, none of which is a junction.
+    /// Strategy a: wider than the box before, or than is usual on the branch.
+    fn is_wider(&self, found: &Found, previous: &Aabb, history: &[[f64; 3]], direction: Direction) -> bool {
+        let widths = found.bounds.widths();
+        let (u, v) = direction.across();
+        let median = |axis: usize| {
+            let mut recent: Vec<f64> = history.iter().rev().take(5).map(|w| w[axis]).collect();
+            recent.sort_by(f64::total_cmp);
+            recent.get(recent.len() / 2).copied()
+        };
+        [u, v].into_iter().any(|axis| {
+            let limit = self.parameters.junction_ratio;
+            let before = previous.widths()[axis];
+            widths[axis] > limit * before || median(axis).is_some_and(|m| widths[axis] > limit * m)
+        })
+    }
+
+    fn make_junction(&mut self, point: u32, bounds: Aabb, step: f64, back: Direction) {
+        let kind = &mut self.skeleton.kinds[point as usize];
+        if *kind == PointKind::Branch {
+            *kind = PointKind::Junction;
+            self.junctions.push(Junction { point, bounds, step, used: vec![back] });
+        }
+    }
+
+    /// The nodes belong to `point` from now on, but for those that have one.
+    fn claim(&mut self, found: &Found, point: u32) {
+        for v in &found.nodes {
+            let owner = &mut self.owner[v.index()];
+            if *owner == NOBODY {
+                *owner = point;
+            }
+        }
+    }
+
+    /// The nearest of the points, none of this branch, that have the nodes, if most nodes have one.
+    fn known(&self, found: &Found, first_own: u32, from: u32) -> Option<u32> {
+        let owners = found.nodes.iter().map(|v| self.owner[v.index()]);
+        let mut others: Vec<u32> = owners.filter(|&o| o < first_own && o != from).collect();
+        if others.len() as f64 <= KNOWN * found.nodes.len() as f64 {
+            return None;
+        }
+        others.sort_unstable();
+        others.dedup();
+        let distance = |p: &u32| self.skeleton.points[*p as usize].distance(found.point);
+        others.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// Whether few edges lead from one point to the other.
+    fn is_near(&self, from: u32, to: u32) -> bool {
+        let mut reached = vec![from];
+        for _ in 0..SAME_WAY {
+            let next = self.skeleton.edges.iter().filter_map(|&[a, b]| {
+                match (reached.contains(&a), reached.contains(&b)) {
+                    (true, false) => Some(b),
+                    (false, true) => Some(a),
+                    _ => None,
+                }
+            });
+            let next: Vec<u32> = next.collect();
+            reached.extend(next);
+        }
+        reached.contains(&to)
+    }
+
+    /// True when the straight way from a point of the skeleton stays in the material, looked at twice a step.
+    fn runs_inside(&self, from: u32, to: DVec3, step: f64) -> bool {
+        let start = self.skeleton.points[from as usize];
+        let count = (2.0 * start.distance(to) / step).ceil().max(2.0) as u32;
+        (1..=count).all(|k| self.inside.contains(start.lerp(to, f64::from(k) / f64::from(count))))
+    }
+
+    /// Takes back the points from `first` on, none of which is a junction. Their nodes stay known to be marched through.
     fn forget(&mut self, first: u32) {
         let skeleton = &mut self.skeleton;
         skeleton.points.truncate(first as usize);
         skeleton.kinds.truncate(first as usize);
         skeleton.sections.truncate(first as usize);
-        skeleton.edges.retain(|e| e[1] < first);
+        skeleton.edges.retain(|e| e[0] < first && e[1] < first);
+        self.owner.iter_mut().filter(|o| **o >= first).for_each(|o| *o = NOBODY);
     }
 
-    /// Scans ahead; where that is vacant, in the four directions across (figure 3.24).
+    /// What continues the nodes of `last` ahead; where that is vacant, in the four directions across (figure 3.24).
     fn look(
         &self,
         ahead: &Aabb,
         direction: Direction,
         previous: &Aabb,
         step: f64,
-        count: usize,
-    ) -> Option<(Found, Direction)> {
-        if let Some(found) = self.scanner.scan(ahead, direction) {
-            return Some((found, direction));
-        }
-        if count == 0 {
-            return None;
+        last: u32,
+    ) -> Option<(Vec<Found>, Direction)> {
+        let ahead = self.continued(self.scanner.scan(ahead, direction), last);
+        if !ahead.is_empty() {
+            return Some((ahead, direction));
         }
         Direction::ALL.into_iter().filter(|d| d.axis != direction.axis).find_map(|d| {
             let mut beside = *previous;
             beside.set_slab(d, previous.front(d), step);
-            self.scanner.scan(&beside, d).map(|found| (found, d))
+            let sets = self.continued(self.scanner.scan(&beside, d), last);
+            (!sets.is_empty()).then_some((sets, d))
         })
+    }
+
+    /// Those of the sets that the box of `point` goes on to.
+    pub(super) fn continued(&self, mut sets: Vec<Found>, point: u32) -> Vec<Found> {
+        let before = |v: VertexId| self.owner[v.index()] == point;
+        if sets.len() > 1 && sets.iter().any(|s| self.scanner.continues(s, before)) {
+            sets.retain(|s| self.scanner.continues(s, before));
+        }
+        let most = sets.iter().map(|s| s.nodes.len()).max().unwrap_or(0);
+        sets.retain(|s| s.nodes.len() as f64 >= BUMP * most as f64);
+        sets
     }
 
     /// The point of an interface other than `from` whose nodes the box holds.

@@ -66,10 +66,6 @@ impl Aabb {
         p.cmpge(self.low).all() && p.cmple(self.high).all()
     }
 
-    pub(super) fn overlaps(&self, other: &Self) -> bool {
-        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
-    }
-
     /// The coordinate of the face that looks along `direction`.
     pub(super) fn front(&self, direction: Direction) -> f64 {
         if direction.forward { self.high[direction.axis] } else { self.low[direction.axis] }
@@ -156,8 +152,9 @@ impl<'a> Scanner<'a> {
     }
 
     /// The nodes in `seed`, and all design nodes between its two planes across `direction` that are connected to
-    /// them through nodes between the planes. `None` when there are none: the box is vacant.
-    pub(super) fn scan(&self, seed: &Aabb, direction: Direction) -> Option<Found> {
+    /// them through nodes between the planes: one set for each connected part of the surface there. None when the box is
+    /// vacant.
+    pub(super) fn scan(&self, seed: &Aabb, direction: Direction) -> Vec<Found> {
         let mesh = &self.part.mesh;
         let axis = direction.axis;
         let (low, high) = (seed.low[axis], seed.high[axis]);
@@ -167,34 +164,54 @@ impl<'a> Scanner<'a> {
         let mut seen = self.seen.borrow_mut();
         seen.0 += 1;
         let mark = seen.0;
-        let mut nodes: Vec<_> =
+        let mut seeds: Vec<_> =
             list[from..to.max(from)].iter().copied().filter(|&v| seed.contains(mesh.position(v))).collect();
-        nodes.sort_unstable();
-        nodes.iter().for_each(|v| seen.1[v.index()] = mark);
-        let mut next = 0;
-        while next < nodes.len() {
-            for h in self.connectivity.outgoing(nodes[next]) {
-                let v = self.connectivity.target(h);
-                let x = mesh.position(v)[axis];
-                if self.is_design[v.index()] && seen.1[v.index()] != mark && x >= low && x <= high {
-                    seen.1[v.index()] = mark;
-                    nodes.push(v);
-                }
+        seeds.sort_unstable();
+        let mut sets = Vec::new();
+        for start in seeds {
+            if std::mem::replace(&mut seen.1[start.index()], mark) == mark {
+                continue;
             }
-            next += 1;
+            let mut nodes = vec![start];
+            let mut next = 0;
+            while next < nodes.len() {
+                for h in self.connectivity.outgoing(nodes[next]) {
+                    let v = self.connectivity.target(h);
+                    let x = mesh.position(v)[axis];
+                    if self.is_design[v.index()] && seen.1[v.index()] != mark && x >= low && x <= high {
+                        seen.1[v.index()] = mark;
+                        nodes.push(v);
+                    }
+                }
+                next += 1;
+            }
+            let mut bounds = Aabb::EMPTY;
+            let mut sum = DVec3::ZERO;
+            for &v in &nodes {
+                bounds.add(mesh.position(v));
+                sum += mesh.position(v);
+            }
+            bounds.low[axis] = low;
+            bounds.high[axis] = high;
+            sets.push(Found { bounds, point: sum / nodes.len() as f64, nodes });
         }
-        if nodes.is_empty() {
-            return None;
-        }
-        let mut bounds = Aabb::EMPTY;
-        let mut sum = DVec3::ZERO;
-        for &v in &nodes {
-            bounds.add(mesh.position(v));
-            sum += mesh.position(v);
-        }
-        bounds.low[axis] = low;
-        bounds.high[axis] = high;
-        Some(Found { bounds, point: sum / nodes.len() as f64, nodes })
+        sets
+    }
+
+    /// Whether an edge of the mesh joins a node of the set to one for which `is_before` holds.
+    pub(super) fn continues(&self, found: &Found, is_before: impl Fn(VertexId) -> bool) -> bool {
+        let c = self.connectivity;
+        found.nodes.iter().any(|&v| is_before(v) || c.outgoing(v).any(|h| is_before(c.target(h))))
+    }
+
+    /// Whether a node of the set lies in a box.
+    pub(super) fn any_within(&self, found: &Found, bounds: &Aabb) -> bool {
+        found.nodes.iter().any(|&v| bounds.contains(self.part.mesh.position(v)))
+    }
+
+    /// Number of nodes, for a table of their owners.
+    pub(super) fn node_count(&self) -> usize {
+        self.is_design.len()
     }
 
     /// The mean of the design nodes in a box whose six sides are all fixed (section 3.4.3.1, figure 3.31).
