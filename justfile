@@ -110,3 +110,10 @@ stiffness-peer cells="16000":
     cargo build --release -p topipe-fem --example speed
     test -x target/pymoto/bin/python || (python3 -m venv target/pymoto && target/pymoto/bin/pip install -q pymoto==2.0.1)
     target/pymoto/bin/python benchmarks/stiffness.py target/release/examples/speed --cells {{cells}}
+
+# Marching sections beside CGAL's mean curvature flow. Needs libcgal-dev, libeigen3-dev and g++.
+skeleton-peers *options:
+    cargo build --release -p topipe-skeleton --example skeletonize
+    test -d target/skeleton-peers || (python3 -m venv target/skeleton-peers && \
+        target/skeleton-peers/bin/pip install -q numpy scipy trimesh networkx)
+    target/skeleton-peers/bin/python crates/skeleton/benches/peers.py {{options}}
