@@ -45,7 +45,7 @@ pub(crate) fn smooth_observed(
     }
     let order = match mesh.triangles.iter().flatten().any(|v| v.index() >= mesh.vertex_count()) {
         true => None,
-        false => Order::along_curve(mesh),
+        false => Order::of(mesh),
     };
     match order {
         None => smooth_as_numbered(part, parameters, progress, observe),
