@@ -456,7 +456,7 @@ pub struct ManArguments {
 /// `topipe new`.
 #[derive(Debug, Args)]
 pub struct NewArguments {
-    /// The mesh: STL, OFF, OBJ or PLY.
+    /// The mesh: STL, OFF, OBJ or PLY, or a density field: VTU or VTI.
     pub mesh: PathBuf,
     /// The pipeline to write [default: the mesh's name with .toml, in this folder].
     #[arg(short, long, value_name = "FILE")]

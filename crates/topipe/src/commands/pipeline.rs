@@ -5,7 +5,7 @@ use std::path::Path;
 use topipe_engine::{ExitCode, Override, Pipeline, Registry};
 
 /// Endings of files that are taken for pipelines by mistake.
-const MESHES: [&str; 4] = ["stl", "off", "obj", "ply"];
+const MESHES: [&str; 6] = ["stl", "off", "obj", "ply", "vtu", "vti"];
 
 /// Loads a pipeline. Somebody who names a mesh instead, or a pipeline that was not written yet, is told how to make one.
 pub(super) fn load(path: &Path, overrides: &[Override], registry: &Registry) -> Result<Pipeline, Failure> {
