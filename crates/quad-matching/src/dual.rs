@@ -21,6 +21,13 @@ pub fn match_quads(
 ) -> Result<QuadLayout, QuadMatchingError> {
     parameters.validate()?;
     let tiles = tiling.tile_count();
+    // Bordered tiles have no dual to be paired: a surface with borders need not have an even number of triangles.
+    // What is refined once anyway is divided from its centres there.
+    if tiling.bordered && parameters.pairing == Pairing::Perfect {
+        let value = "perfect".into();
+        let range = "\"refined\" or \"midpoint\" for bordered tiles; set method = \"augmented-voronoi\" of the tiling for the others";
+        return Err(QuadMatchingError::Parameter { field: "pairing", value, range });
+    }
     if parameters.pairing == Pairing::Midpoint || tiling.bordered {
         return crate::midpoint::subdivide(tiling, parameters, progress);
     }

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 pub enum Pairing {
     /// Pairs that make good quads are matched, then everything is refined once: a quad gives four quads, a triangle
-    /// three. No corner is forced to be reflex, no feature edge is given up.
+    /// three. No corner is forced to be reflex, no feature edge is given up. Bordered tiles, which have no pairs, are
+    /// divided as with `midpoint`.
     Refined,
     /// Tiles themselves are subdivided from their centres to the middles of their sides. The only way for bordered
     /// tiles.
@@ -23,7 +24,7 @@ pub enum Pairing {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Parameters {
-    /// How macro-triangles become quads: "refined" or "perfect".
+    /// How tiles become quads: "refined", "midpoint" or "perfect" (closed surfaces only).
     pub pairing: Pairing,
     /// Two triangles are paired for refinement only where no corner of their quad is wider than this, degrees.
     pub pair_angle: f64,

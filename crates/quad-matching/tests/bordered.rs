@@ -235,3 +235,12 @@ fn rotation(axis: DVec3, angle: f64) -> impl Fn(DVec3) -> DVec3 {
         c * p + s * axis.cross(p) + (1.0 - c) * axis.dot(p) * axis
     }
 }
+
+#[test]
+fn only_closed_surfaces_are_paired() {
+    let part = torus(40, 24, 1.0);
+    let tiling = tiled(&part, &tiling_parameters());
+    let parameters = Parameters { pairing: Pairing::Perfect, ..Default::default() };
+    let error = match_quads(&tiling, &parameters, &Progress::silent()).unwrap_err().to_string();
+    assert!(error.contains("pairing") && error.contains("augmented-voronoi"), "{error}");
+}
