@@ -50,7 +50,9 @@ pub struct Parameters {
 /// | 0 | 811; 5.1 %; 86; 0.89 mm | 1,079; 6.8 %; 178; 4.7 mm |
 /// | 150 | 778; 6.1 %; 52; 0.57 mm | 1,409; 4.4 %; 139; 2.9 mm |
 /// | 100 | 1,040; 4.3 %; 25; 0.32 mm | 1,983; 2.7 %; 82; 1.6 mm |
-const DEFAULT_BEND: f64 = 100.0;
+///
+/// With 100 parts of slender beams get two to three times as many patches (cantilever-four 4,551).
+const DEFAULT_BEND: f64 = 150.0;
 
 impl Default for Parameters {
     fn default() -> Self {
