@@ -17,6 +17,9 @@ use topipe_quad_matching::QuadLayout;
 
 /// Waves of the border shorter than this many edges of the mesh are teeth of the mesh and damped to less than half.
 const SHORTEST_WAVE: f64 = 4.0;
+/// A closed border keeps waves longer than this share of its length, however short: the border of a small dent, damped
+/// like a longer one, would shrink to a star.
+const OWN_WAVE: f64 = 0.25;
 /// Spans of the reference curve are at most this many edges of the mesh long.
 const FINEST_SPAN: f64 = 2.0;
 /// Spans are joined as long as the curve moves by less than this share of an edge of the mesh.
@@ -186,7 +189,9 @@ impl Outline {
             }
         }
         let ends = (!chain.closed).then_some([first, last]);
-        let mu = (SHORTEST_WAVE * grain / (2.0 * PI)).powi(4);
+        let own = if chain.closed { OWN_WAVE * length } else { f64::INFINITY };
+        let wave = own.min(SHORTEST_WAVE * grain);
+        let mu = (wave / (2.0 * PI)).powi(4);
         let finest: Vec<usize> = self
             .starts
             .windows(2)
