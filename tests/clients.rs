@@ -192,9 +192,11 @@ fn check_solid(python: &Path, folder: &Path, sizes: [f64; 4]) {
     let side = |s: &str| number(&solid, &format!("/reference/{s}/max_mm"));
     let (farthest, ours) =
         (side("cad_to_mesh").max(side("mesh_to_cad")), number(&report, "/surface/deviation/max_mm"));
-    // Theirs is at random points and against chords of the diagonal / 2000; both are lower bounds.
+    // Theirs is at one random point per mm2 and at vertices of the mesh, against chords of the diagonal / 2000: a lower
+    // bound that a narrow place escapes. Ours looks closer (0.82 for 0.61 mm on the bracket), but sees nothing else.
     let chord = number(&solid, "/bbox_diagonal_mm") / 2000.0;
-    close("largest deviation", ours, farthest, 0.2 * farthest + chord);
+    assert!(ours >= 0.8 * farthest - chord, "largest deviation: ours {ours}, theirs {farthest}");
+    assert!(ours <= 1.5 * farthest + chord, "largest deviation: ours {ours}, theirs {farthest}");
 }
 
 /// The smoothed mesh is closed, keeps its volume and its holes.
