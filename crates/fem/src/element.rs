@@ -14,7 +14,7 @@ pub(crate) const UNKNOWNS: usize = 24;
 /// The stiffness of a cube with Young's modulus 1 and edges of length 1.
 #[derive(Debug, Clone)]
 pub struct Hexahedron {
-    /// By [`UNKNOWNS`].
+    /// By `UNKNOWNS`.
     pub stiffness: [[f64; UNKNOWNS]; UNKNOWNS],
     /// In the Walsh basis: block `p` joins component `c`, function `p ^ (1 << c)`, for the three `c`.
     pub(crate) blocks: [[f64; 9]; 8],
