@@ -1,6 +1,8 @@
 //! Fits a case of `fixtures/` and prints how patches meet, worst places first.
 //!
-//!     cargo run --release -p topipe-spline-fit --example continuity -- bracket [SPANS] [REFINEMENTS] [BENDING]
+//!     cargo run --release -p topipe-spline-fit --example continuity -- bracket [SPANS] [REFINEMENTS] [BEND] [LAMBDA]
+//!
+//! BEND is that of the tiling.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -25,34 +27,29 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let name = arguments.next().unwrap_or("bracket".into());
     let number = |text: Option<String>, default: u32| text.map_or(Ok(default), |t| t.parse());
-    let parameters = Parameters {
-        spans: number(arguments.next(), Parameters::default().spans)?,
-        refinements: number(arguments.next(), 0)?,
-        lambda: 1.0
-            - arguments.next().map_or(Ok(1.0 - Parameters::default().lambda), |t| t.parse::<f64>())?,
-        ..Default::default()
-    };
+    let share = |text: Option<String>, default: f64| text.map_or(Ok(default), |t| t.parse());
+    let spans = number(arguments.next(), Parameters::default().spans)?;
+    let refinements = number(arguments.next(), Parameters::default().refinements)?;
+    let bend = share(arguments.next(), topipe_tiling::Parameters::default().bend)?;
+    let lambda = share(arguments.next(), Parameters::default().lambda)?;
+    let parameters = Parameters { spans, refinements, lambda, ..Default::default() };
     let silent = Progress::silent();
     let path = format!("fixtures/{name}/{name}.stl");
     let part = read(&path, &std::fs::read(&path)?, &ImportOptions::default())?;
     let part = topipe_smoothing::smooth(&part, &Default::default(), &silent)?;
-    let tiling = topipe_tiling::tile(
-        &part,
-        &topipe_tiling::Parameters {
-            least_region: std::env::var("TP_LEAST").ok().and_then(|s| s.parse().ok()).unwrap_or(0.5),
-            normal_cone: std::env::var("TP_CONE").ok().and_then(|s| s.parse().ok()).unwrap_or(100.0),
-            bend: std::env::var("TP_BEND").ok().and_then(|s| s.parse().ok()).unwrap_or(0.0),
-            ..Default::default()
-        },
-        &silent,
-    )?;
+    let tile_parameters = topipe_tiling::Parameters { bend, ..Default::default() };
+    let tiling = topipe_tiling::tile(&part, &tile_parameters, &silent)?;
     let start = Instant::now();
     let layout = topipe_quad_matching::match_quads(&tiling, &Default::default(), &silent)?;
-    println!("quads {:.2} s, {:?}", start.elapsed().as_secs_f64(), {
-        let a: Vec<f64> = layout.corner_angles().iter().flatten().map(|a| a.to_degrees()).collect();
-        let c = |l: f64, h: f64| a.iter().filter(|a| **a < l || **a > h).count();
-        (a.len(), c(45.0, 135.0), c(30.0, 150.0), c(15.0, 165.0))
-    });
+    let corners: Vec<f64> = layout.corner_angles().iter().flatten().map(|a| a.to_degrees()).collect();
+    let outside = |low: f64, high: f64| corners.iter().filter(|a| **a < low || **a > high).count();
+    println!(
+        "quads {:.2} s, {} corners: {} outside 45 to 135 degrees, {} outside 15 to 165",
+        start.elapsed().as_secs_f64(),
+        corners.len(),
+        outside(45.0, 135.0),
+        outside(15.0, 165.0)
+    );
     let start = Instant::now();
     let surface = fit(&layout, &parameters, &Units::none(), &Progress::new(Arc::new(Print)))?;
     println!(

@@ -55,7 +55,7 @@ pub struct Parameters {
 const DEFAULT_LAMBDA: f64 = 1.0 - 1e-5;
 
 /// Spans and how often they are doubled. Smooth edges above 0.1 degrees of all, largest jump, and seconds for the fit (two
-/// cores shared with other work):
+/// cores shared with other work; tiles of one size, without labels: `--example continuity -- CASE SPANS REFINEMENTS 0`):
 ///
 /// | spans, refinements | y-form (1,070 edges) | support (1,495) | bridge (2,417) |
 /// |---|---|---|---|
