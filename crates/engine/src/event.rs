@@ -72,8 +72,16 @@ pub enum Event {
         stage: String,
         /// So many parts were there,
         reused: u64,
-        /// so many were computed and are kept.
+        /// so many were computed.
         computed: u64,
+    },
+    /// Finished parts cannot be written to the cache. Sent once when it begins; the stage goes on, and they are written
+    /// when there is room. Sent again if they are still not there when the stage ends.
+    UnitsNotKept {
+        /// The stage.
+        stage: String,
+        /// How many, and why.
+        message: String,
     },
     /// A stage is done and its result is in the cache.
     StageFinished {
@@ -137,6 +145,11 @@ pub enum Event {
         message: String,
         /// What this means for the exit code.
         code: ExitCode,
+    },
+    /// The record of the run could not be written into the output folder.
+    RecordNotWritten {
+        /// Why.
+        message: String,
     },
     /// The run is over.
     RunFinished {

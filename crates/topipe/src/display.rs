@@ -183,6 +183,10 @@ impl EventSink for Console {
                 self.end(stage);
                 self.line(Verbosity::Quiet, &format!("error: stage `{stage}`: {message}"));
             }
+            Event::UnitsNotKept { stage, message } => {
+                self.line(Verbosity::Normal, &format!("warning: {stage}: {message}"));
+            }
+            Event::RecordNotWritten { message } => self.line(Verbosity::Quiet, &format!("error: {message}")),
             Event::ExportFailed { file, message, .. } => {
                 self.line(Verbosity::Quiet, &format!("error: export {file}: {message}"));
             }

@@ -1,6 +1,7 @@
 //! What ends a command early.
 
 use std::fmt;
+use topipe_engine::cache::CacheError;
 use topipe_engine::{Diagnostic, EngineError, ExitCode, SpecError};
 
 /// An error message with its exit code.
@@ -16,8 +17,8 @@ impl Failure {
     }
 
     /// A file operation went wrong.
-    pub(crate) fn io(action: &str, path: &std::path::Path, error: &std::io::Error) -> Self {
-        Self::new(ExitCode::Storage, format!("cannot {action} {}: {error}", path.display()))
+    pub(crate) fn io(action: &'static str, path: &std::path::Path, error: std::io::Error) -> Self {
+        CacheError::io(action, path, error).into()
     }
 
     pub(crate) fn code(&self) -> ExitCode {
@@ -50,8 +51,8 @@ impl From<SpecError> for Failure {
     }
 }
 
-impl From<topipe_engine::cache::CacheError> for Failure {
-    fn from(error: topipe_engine::cache::CacheError) -> Self {
+impl From<CacheError> for Failure {
+    fn from(error: CacheError) -> Self {
         EngineError::from(error).into()
     }
 }

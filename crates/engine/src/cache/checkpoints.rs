@@ -25,17 +25,6 @@ pub struct UnitCounts {
     pub computed: u64,
 }
 
-/// Units of one sort that a stage is going to need.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct UnitsAtHand {
-    /// What they are: "patches".
-    pub what: String,
-    /// So many are in the cache
-    pub kept: u64,
-    /// of so many.
-    pub total: u64,
-}
-
 /// The folder of the units that this code of this kind of stage makes.
 pub(super) fn folder(root: &Path, kind: &str, code_version: &str) -> PathBuf {
     let namespace = FieldHasher::new("topipe units 1").text(kind).text(code_version).finish();
@@ -43,7 +32,7 @@ pub(super) fn folder(root: &Path, kind: &str, code_version: &str) -> PathBuf {
 }
 
 /// A segment that is open for reading. Its file stays readable when it is moved or deleted meanwhile.
-struct Segment {
+pub(super) struct Segment {
     path: PathBuf,
     file: Arc<File>,
     /// It is damaged and was moved aside.
@@ -63,9 +52,30 @@ struct State {
     segments: Vec<Segment>,
     index: HashMap<UnitKey, (usize, Record)>,
     writer: Option<Writer>,
-    /// Writing failed; nothing more is kept in this run.
-    failed: bool,
+    unwritten: Unwritten,
     counts: UnitCounts,
+}
+
+/// What could not be written yet, in the order in which it came.
+#[derive(Default)]
+struct Unwritten {
+    waiting: Vec<(RecordKind, UnitKey, Vec<u8>)>,
+    /// When it was last tried in vain.
+    tried: Option<Instant>,
+}
+
+impl Unwritten {
+    fn units(&self) -> usize {
+        self.waiting.iter().filter(|(kind, ..)| *kind == RecordKind::Unit).count()
+    }
+}
+
+/// What the units of a run have to tell.
+pub(crate) enum Notice {
+    /// A segment did not verify.
+    Damage(Damage),
+    /// Finished units are not in the cache: for now, or, when the stage ends, at all.
+    NotKept(String),
 }
 
 /// The units of one stage run. Opened by the first use, so that a stage without units costs nothing. The lock of the
@@ -76,22 +86,25 @@ pub(crate) struct UnitCheckpoints {
     stage: ContentHash,
     anew: bool,
     state: Mutex<State>,
-    report: Box<dyn Fn(Damage) + Send + Sync>,
+    report: Box<dyn Fn(Notice) + Send + Sync>,
 }
 
 /// A loss of power costs at most the units of this time.
 const SYNC_EVERY: Duration = Duration::from_secs(5);
 
+/// Where there was no room for a unit it is tried again after this time: somebody may have made some.
+const RETRY_EVERY: Duration = Duration::from_secs(1);
+
 impl UnitCheckpoints {
-    /// The units for the run of a stage with the key `stage`; damage goes to `report`. With `anew`, nothing that an
-    /// earlier run has kept is found.
+    /// The units for the run of a stage with the key `stage`; `report` is told of what goes wrong. With `anew`, nothing
+    /// that an earlier run has kept is found.
     pub(crate) fn new(
         cache: &Cache,
         kind: &str,
         code_version: &str,
         stage: ContentHash,
         anew: bool,
-        report: impl Fn(Damage) + Send + Sync + 'static,
+        report: impl Fn(Notice) + Send + Sync + 'static,
     ) -> Self {
         let folder = folder(cache.root(), kind, code_version);
         Self { cache: cache.clone(), folder, stage, anew, state: Mutex::default(), report: Box::new(report) }
@@ -100,6 +113,10 @@ impl UnitCheckpoints {
     /// Ends the run: flushes what was written, and marks what was used as used now.
     pub(crate) fn finish(&self) -> UnitCounts {
         let mut state = self.lock();
+        if let Err(error) = self.write_waiting(&mut state) {
+            let (lost, made) = (state.unwritten.units(), state.counts.computed);
+            (self.report)(Notice::NotKept(format!("{lost} of {made} finished parts are not kept: {error}")));
+        }
         if let Some(writer) = state.writer.take() {
             // Losing it with the power costs time only.
             let _ = writer.file.sync_data();
@@ -127,7 +144,7 @@ impl UnitCheckpoints {
                 }
                 state.segments.push(segment);
             }
-            damages.into_iter().for_each(|damage| (self.report)(damage));
+            damages.into_iter().for_each(|damage| (self.report)(Notice::Damage(damage)));
             self.rescue(&mut state);
         }
         state
@@ -146,19 +163,58 @@ impl UnitCheckpoints {
         }
     }
 
+    /// Appends a record. What there is no room for waits in memory until there is some.
     fn append(&self, state: &mut State, kind: RecordKind, key: UnitKey, value: &[u8]) {
-        if state.failed {
-            return;
-        }
-        if let Err(error) = self.try_append(state, kind, key, value) {
-            // Units only save time; a full disk is told by the stage's result when it cannot be stored.
-            tracing::warn!("finished parts cannot be kept: {error}");
-            state.failed = true;
-            state.writer = None;
+        let written = if state.unwritten.waiting.is_empty() {
+            self.try_append(state, kind, key, value)
+        } else {
+            let waited = state.unwritten.tried.is_none_or(|last| last.elapsed() >= RETRY_EVERY);
+            if waited && self.write_waiting(state).is_ok() {
+                self.try_append(state, kind, key, value)
+            } else {
+                state.unwritten.waiting.push((kind, key, value.to_vec()));
+                return;
+            }
+        };
+        if let Err(error) = written {
+            (self.report)(Notice::NotKept(format!(
+                "finished parts cannot be kept for now: {error}; they wait in memory for room"
+            )));
+            state.unwritten.waiting.push((kind, key, value.to_vec()));
         }
     }
 
+    /// Writes what waits.
+    fn write_waiting(&self, state: &mut State) -> Result<(), CacheError> {
+        let mut waiting = std::mem::take(&mut state.unwritten.waiting);
+        for k in 0..waiting.len() {
+            let (kind, key, value) = &waiting[k];
+            if let Err(error) = self.try_append(state, *kind, *key, value) {
+                state.unwritten.waiting = waiting.split_off(k);
+                return Err(error);
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends a record. After an error the next one begins with the segment as it is found on the disk, so that half
+    /// a record is cut off.
     fn try_append(
+        &self,
+        state: &mut State,
+        kind: RecordKind,
+        key: UnitKey,
+        value: &[u8],
+    ) -> Result<(), CacheError> {
+        let appended = self.append_to_segment(state, kind, key, value);
+        if appended.is_err() {
+            state.unwritten.tried = Some(Instant::now());
+            state.writer = None;
+        }
+        appended
+    }
+
+    fn append_to_segment(
         &self,
         state: &mut State,
         kind: RecordKind,
@@ -194,9 +250,15 @@ impl UnitStore for UnitCheckpoints {
             return None;
         }
         let (at, record, file) = {
-            let state = self.opened();
-            let (at, record) = state.index.get(&key)?;
-            (*at, *record, Arc::clone(&state.segments[*at].file))
+            let mut state = self.opened();
+            let Some((at, record)) = state.index.get(&key).copied() else {
+                let waiting = &state.unwritten.waiting;
+                let value =
+                    waiting.iter().find(|(_, waits, _)| *waits == key).map(|(.., value)| value.clone())?;
+                state.counts.reused += 1;
+                return Some(value);
+            };
+            (at, record, Arc::clone(&state.segments[at].file))
         };
         let value = segment::read(&file, &record);
         let mut state = self.lock();
@@ -210,7 +272,8 @@ impl UnitStore for UnitCheckpoints {
                 state.index.remove(&key);
                 if !state.segments[at].condemned {
                     let path = state.segments[at].path.clone();
-                    (self.report)(self.cache.quarantine(&path, "a unit does not match its hash"));
+                    let damage = self.cache.quarantine(&path, "a unit does not match its hash");
+                    (self.report)(Notice::Damage(damage));
                     for segment in state.segments.iter_mut().filter(|segment| segment.path == path) {
                         segment.condemned = true;
                     }
@@ -263,7 +326,7 @@ fn open_writer(path: &Path, stage: ContentHash) -> std::io::Result<Writer> {
 }
 
 /// Opens all segments of a namespace. Damaged ones are moved aside; what is good in them is still read.
-fn open_all(cache: &Cache, folder: &Path) -> (Vec<(Segment, Contents)>, Vec<Damage>) {
+pub(super) fn open_all(cache: &Cache, folder: &Path) -> (Vec<(Segment, Contents)>, Vec<Damage>) {
     let (mut segments, mut damages) = (Vec::new(), Vec::new());
     let mut paths: Vec<PathBuf> =
         std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
@@ -282,84 +345,6 @@ fn open_all(cache: &Cache, folder: &Path) -> (Vec<(Segment, Contents)>, Vec<Dama
     (segments, damages)
 }
 
-fn stage_of(path: &Path) -> Option<ContentHash> {
+pub(super) fn stage_of(path: &Path) -> Option<ContentHash> {
     path.file_name()?.to_str()?.parse().ok()
-}
-
-impl Cache {
-    /// What an interrupted run with the key `stage` said it needs, and how much of it is there.
-    pub(crate) fn units_of_interrupted_run(
-        &self,
-        kind: &str,
-        code_version: &str,
-        stage: ContentHash,
-        damages: &mut Vec<Damage>,
-    ) -> Vec<UnitsAtHand> {
-        let folder = folder(self.root(), kind, code_version);
-        let path = folder.join(stage.to_hex());
-        let Ok(file) = File::open(&path) else { return Vec::new() };
-        let Ok(contents) = segment::contents(&file, stage) else { return Vec::new() };
-        let lists = contents.records.iter().filter(|record| record.kind == RecordKind::List);
-        let mut needed: Vec<(String, Vec<UnitKey>)> = Vec::new();
-        for list in lists {
-            // The last run says it again: only the newest list of a name counts.
-            let Some((what, keys)) =
-                segment::read(&file, list).ok().flatten().and_then(|value| segment::parse_list(&value))
-            else {
-                continue;
-            };
-            needed.retain(|(known, _)| *known != what);
-            needed.push((what, keys));
-        }
-        self.units_at_hand(kind, code_version, &needed, damages)
-    }
-
-    /// How many of these units are there.
-    pub(crate) fn units_at_hand(
-        &self,
-        kind: &str,
-        code_version: &str,
-        needed: &[(String, Vec<UnitKey>)],
-        damages: &mut Vec<Damage>,
-    ) -> Vec<UnitsAtHand> {
-        if needed.is_empty() {
-            return Vec::new();
-        }
-        let (segments, found) = open_all(self, &folder(self.root(), kind, code_version));
-        damages.extend(found);
-        let there: std::collections::HashSet<UnitKey> = segments
-            .iter()
-            .flat_map(|(_, contents)| &contents.records)
-            .filter(|record| record.kind == RecordKind::Unit)
-            .map(|record| record.key)
-            .collect();
-        needed
-            .iter()
-            .map(|(what, keys)| UnitsAtHand {
-                what: what.clone(),
-                kept: keys.iter().filter(|key| there.contains(key)).count() as u64,
-                total: keys.len() as u64,
-            })
-            .collect()
-    }
-
-    /// Checks every unit of a segment. Returns what is wrong with it; a torn end is not.
-    pub(super) fn verify_units(path: &Path) -> Result<(), String> {
-        let stage = stage_of(path).ok_or("its name is not a hash")?;
-        let check = || -> std::io::Result<Result<(), String>> {
-            let file = File::open(path)?;
-            let contents = segment::contents(&file, stage)?;
-            for record in &contents.records {
-                if segment::read(&file, record)?.is_none() {
-                    return Ok(Err("a unit does not match its hash".into()));
-                }
-            }
-            Ok(match contents.ending {
-                Ending::Damaged(reason) => Err(reason.into()),
-                Ending::Whole | Ending::Torn => Ok(()),
-            })
-        };
-        // A segment that is deleted meanwhile is no damage.
-        check().unwrap_or(Ok(()))
-    }
 }

@@ -21,7 +21,8 @@ const TAG_TEXT: &str = "Signature: 8a477f597d28d172789f06886806bc55\n\
 
 /// What a process uses, until it is dropped.
 pub(crate) struct Lease {
-    /// Nothing where the cache cannot be written: then nothing can be deleted either.
+    /// Nothing where the cache cannot be written. Should somebody who can delete what this process has found, it is
+    /// computed again.
     open: Option<Mutex<(Temporary, File)>>,
 }
 

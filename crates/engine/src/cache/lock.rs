@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 #[non_exhaustive]
 pub enum LockError {
     /// The lock file cannot be made or locked.
-    #[error("cannot lock {path}: {error}")]
+    #[error("cannot lock {path}: {error}{}", super::store::advice(error))]
     Io {
         /// The lock file.
         path: String,

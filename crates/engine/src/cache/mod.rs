@@ -16,10 +16,11 @@ mod seal;
 mod segment;
 mod store;
 mod temporary;
+mod units_at_hand;
 mod verify;
 
-pub(crate) use checkpoints::UnitCheckpoints;
-pub use checkpoints::{UnitCounts, UnitsAtHand};
+pub use checkpoints::UnitCounts;
+pub(crate) use checkpoints::{Notice, UnitCheckpoints};
 pub use gc::{Collected, GcItem, GcLimits, GcPlan, GcReason, HurtRun};
 pub use layout::Bucket;
 pub(crate) use lease::Lease;
@@ -31,3 +32,4 @@ pub(crate) use segment::read_at;
 pub use store::{Cache, CacheError, Damage, KeyRecord, StoredArtifact, Usage};
 pub use temporary::write_atomically;
 pub(crate) use temporary::{Durability, Temporary, sweep};
+pub use units_at_hand::UnitsAtHand;

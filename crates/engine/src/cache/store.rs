@@ -17,7 +17,7 @@ use std::time::{Duration, SystemTime};
 #[non_exhaustive]
 pub enum CacheError {
     /// A file operation failed.
-    #[error("cannot {action} {path}: {error}")]
+    #[error("cannot {action} {path}: {error}{}", advice(error))]
     Io {
         /// "read", "write" ...
         action: &'static str,
@@ -35,8 +35,20 @@ pub enum CacheError {
 }
 
 impl CacheError {
-    pub(crate) fn io(action: &'static str, path: &Path, error: std::io::Error) -> Self {
+    /// What could not be done with a file, and why.
+    pub fn io(action: &'static str, path: &Path, error: std::io::Error) -> Self {
         Self::Io { action, path: path.display().to_string(), error }
+    }
+}
+
+/// What to do where something cannot be written; empty where the error says it.
+pub(super) fn advice(error: &std::io::Error) -> &'static str {
+    match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            "; make room there (`topipe cache gc` says what can go from a cache) and run again: what is finished is kept"
+        }
+        ErrorKind::ReadOnlyFilesystem => "; take another folder (`--cache`, `--out`)",
+        _ => "",
     }
 }
 

@@ -1,5 +1,7 @@
 //! Checking every file of a cache.
 
+use super::checkpoints::stage_of;
+use super::segment::{self, Ending};
 use super::store::hash_of_path;
 use super::{Bucket, Cache, CacheError, Damage};
 use crate::codec;
@@ -41,6 +43,26 @@ impl Cache {
             }
         }
         Ok((good, damages))
+    }
+
+    /// Checks every unit of a segment. Returns what is wrong with it; a torn end is not.
+    fn verify_units(path: &Path) -> Result<(), String> {
+        let stage = stage_of(path).ok_or("its name is not a hash")?;
+        let check = || -> std::io::Result<Result<(), String>> {
+            let file = File::open(path)?;
+            let contents = segment::contents(&file, stage)?;
+            for record in &contents.records {
+                if segment::read(&file, record)?.is_none() {
+                    return Ok(Err("a unit does not match its hash".into()));
+                }
+            }
+            Ok(match contents.ending {
+                Ending::Damaged(reason) => Err(reason.into()),
+                Ending::Whole | Ending::Torn => Ok(()),
+            })
+        };
+        // A segment that is deleted meanwhile is no damage.
+        check().unwrap_or(Ok(()))
     }
 }
 

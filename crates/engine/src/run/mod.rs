@@ -106,7 +106,7 @@ pub fn run(
     let expected = of_stages.filter(|export| selection.selected.contains(&export.stage)).count();
     let code = exit_code(interrupt, &stages, &exports, expected);
     let seconds = start.elapsed().as_secs_f64();
-    let record = RunRecord {
+    let mut record = RunRecord {
         program: options.program.clone(),
         pipeline: pipeline.name.clone(),
         spec: std::path::absolute(&pipeline.path).unwrap_or_else(|_| pipeline.path.clone()),
@@ -118,11 +118,16 @@ pub fn run(
         stages,
         exports,
     };
-    record.write(&options.out)?;
+    if let Err(error) = record.write(&options.out) {
+        events.emit(&Event::RecordNotWritten { message: error.to_string() });
+        if record.code == ExitCode::Done {
+            (record.code, record.exit_code) = (ExitCode::Storage, ExitCode::Storage.number());
+        }
+    }
     if let Err(error) = cache.keep_run(&record) {
         tracing::debug!("the run is not remembered: {error}");
     }
-    events.emit(&Event::RunFinished { code, seconds });
+    events.emit(&Event::RunFinished { code: record.code, seconds });
     Ok(record)
 }
 

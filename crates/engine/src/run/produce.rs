@@ -4,7 +4,7 @@ use super::executor::{Executor, lock};
 use super::failure::Failure;
 use super::listener::StageListener;
 use crate::artifact::Value;
-use crate::cache::{CacheError, KeyRecord, Lease, StoredArtifact, UnitCheckpoints, UnitCounts};
+use crate::cache::{CacheError, KeyRecord, Lease, Notice, StoredArtifact, UnitCheckpoints, UnitCounts};
 use crate::error::ExitCode;
 use crate::event::Event;
 use crate::hash::ContentHash;
@@ -59,14 +59,19 @@ impl Executor<'_> {
         let listener =
             Arc::new(StageListener::new(&node.name, self.interrupt.clone(), Arc::clone(&self.events)));
         let progress = Progress::new(listener.clone());
-        let events = Arc::clone(&self.events);
+        let (events, name) = (Arc::clone(&self.events), node.name.clone());
         let checkpoints = Arc::new(UnitCheckpoints::new(
             self.cache(),
             node.stage.kind(),
             self.decider.code_version(stage),
             key,
             forced,
-            move |damage| events.emit(&Event::quarantined(damage)),
+            move |notice| match notice {
+                Notice::Damage(damage) => events.emit(&Event::quarantined(damage)),
+                Notice::NotKept(message) => {
+                    events.emit(&Event::UnitsNotKept { stage: name.clone(), message });
+                }
+            },
         ));
         let units = Units::new(checkpoints.clone());
         let context = StageContext { inputs, files, progress: &progress, units };

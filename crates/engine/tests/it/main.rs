@@ -6,6 +6,8 @@ mod child;
 mod concurrency;
 mod exports;
 mod failures;
+#[cfg(target_os = "linux")]
+mod full_disk;
 mod gc;
 mod keys;
 mod kills;
@@ -15,6 +17,9 @@ mod remote;
 mod reproducing;
 mod schema;
 mod selection;
+#[cfg(target_os = "linux")]
+#[path = "../../../../tests/small_disk/mod.rs"]
+mod small_disk;
 mod spec_errors;
 mod sweeps;
 mod toy;

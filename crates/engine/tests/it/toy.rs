@@ -334,6 +334,8 @@ pub(crate) struct Workshop {
     /// Deletes the folder in the end, if it is ours.
     _owned: Option<tempfile::TempDir>,
     pub registry: Registry,
+    /// Its cache, in the folder if relative.
+    pub cache_folder: PathBuf,
     /// The file of the pipeline.
     pub spec: String,
     pub options: RunOptions,
@@ -357,6 +359,7 @@ impl Workshop {
             folder,
             _owned: None,
             registry: registry(),
+            cache_folder: "cache".into(),
             spec: "p.toml".into(),
             options,
             interrupt: Interrupt::new(),
@@ -386,7 +389,7 @@ impl Workshop {
     }
 
     pub(crate) fn cache(&self) -> Cache {
-        Cache::new(self.path("cache"))
+        Cache::new(self.folder.join(&self.cache_folder))
     }
 
     pub(crate) fn pipeline(&self, sets: &[&str]) -> Pipeline {
@@ -469,6 +472,8 @@ pub(crate) fn line(event: &Event) -> String {
         Event::StageUnits { stage, reused, computed } => {
             format!("{stage} units: {reused} reused, {computed} computed")
         }
+        Event::UnitsNotKept { stage, message } => format!("{stage} parts not kept: {message}"),
+        Event::RecordNotWritten { message } => format!("record not written: {message}"),
         Event::StageFinished { stage, .. } => format!("{stage} finished"),
         Event::StageFailed { stage, message, code } => {
             format!("{stage} failed ({}): {message}", code.number())

@@ -12,7 +12,7 @@ pub(crate) fn run(arguments: &ManArguments) -> Result<ExitCode, Failure> {
     let Some(folder) = &arguments.output else {
         return super::print(&String::from_utf8_lossy(&page(command)?));
     };
-    std::fs::create_dir_all(folder).map_err(|error| Failure::io("make the folder", folder, &error))?;
+    std::fs::create_dir_all(folder).map_err(|error| Failure::io("make the folder", folder, error))?;
     let mut written = String::new();
     for (name, command) in pages(command) {
         let path = folder.join(format!("{name}.1"));

@@ -29,7 +29,7 @@ fn print(text: &str) -> Result<ExitCode, Failure> {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Failure::io("write", Path::new("stdout"), &error))
+            Err(Failure::io("write", Path::new("stdout"), error))
         }
         _ => Ok(ExitCode::Done),
     }

@@ -72,7 +72,7 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<ExitCode, Failure> {
 }
 
 fn look_at(mesh: &Path) -> Result<Looked, Failure> {
-    let bytes = std::fs::read(mesh).map_err(|error| Failure::io("read", mesh, &error))?;
+    let bytes = std::fs::read(mesh).map_err(|error| Failure::io("read", mesh, error))?;
     let file = mesh.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let part = topipe_mesh::import::read(&file, &bytes, &ImportOptions::default())
         .map_err(|error| Failure::new(ExitCode::Refused, error.to_string()))?;

@@ -70,7 +70,7 @@ fn file(name: &str) -> Option<PathBuf> {
 
 /// Reads a `run.json`.
 pub(super) fn read(path: &Path) -> Result<RunRecord, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::io("read", path, &error))?;
+    let text = std::fs::read_to_string(path).map_err(|error| Failure::io("read", path, error))?;
     serde_json::from_str(&text).map_err(|error| {
         Failure::new(ExitCode::Usage, format!("{} is not the record of a run: {error}", path.display()))
     })

@@ -13,7 +13,7 @@ pub(super) fn read(arguments: &TargetArguments) -> Result<(PathBuf, Vec<u8>), Fa
         Some(pipeline) => stage_file(arguments, pipeline)?,
         None => arguments.target.clone().into(),
     };
-    let bytes = std::fs::read(&path).map_err(|error| Failure::io("read", &path, &error))?;
+    let bytes = std::fs::read(&path).map_err(|error| Failure::io("read", &path, error))?;
     Ok((path, bytes))
 }
 

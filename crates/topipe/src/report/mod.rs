@@ -79,7 +79,7 @@ pub(crate) fn write(
     let (doctype, rest) = page.split_once('>').unwrap_or((page.as_str(), ""));
     let seal = seal(key, page.len());
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder).map_err(|error| Failure::io("make the folder", folder, &error))?;
+        std::fs::create_dir_all(folder).map_err(|error| Failure::io("make the folder", folder, error))?;
     }
     write_atomically(path, format!("{doctype}>{seal}{rest}").as_bytes())?;
     Ok(true)
