@@ -1,0 +1,169 @@
+//! Runs that are interrupted or killed.
+
+use crate::workshop::{FIT, NOTHING, Workshop, box_off, files_below};
+use serde_json::Value;
+use std::path::PathBuf;
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_ends_with_130_and_the_next_one_finishes() {
+    let shop = Workshop::new();
+    shop.write("box.off", &box_off(60));
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
+        .current_dir(shop.folder.path())
+        // Far more iterations than fit into any patience.
+        .args([
+            "run",
+            "box.toml",
+            "--json",
+            "--set",
+            "smooth.iterations=100000000",
+            "--set",
+            "smooth.tolerance=0",
+        ])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut lines = std::io::BufRead::lines(std::io::BufReader::new(child.stdout.take().unwrap()));
+    assert!(lines.any(|line| line.unwrap().contains("\"stage-started\",\"stage\":\"smooth\"")));
+    let signalled = std::process::Command::new("kill").arg(child.id().to_string()).status().unwrap();
+    assert!(signalled.success());
+    let rest: Vec<String> = lines.map(Result::unwrap).collect();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:#?}");
+    assert!(rest.last().unwrap().contains("\"interrupted\""), "{rest:#?}");
+    assert!(files_below(&shop.path(".topipe/locks-v1")).is_empty());
+    let events = shop.events(&[]);
+    assert_eq!(events[1..3], ["stage-cached mesh", "stage-started smooth"]);
+}
+
+/// A signal ends a run whatever it is doing: here it waits for a file that nobody writes.
+#[cfg(unix)]
+#[test]
+fn a_run_that_cannot_stop_by_itself_is_ended() {
+    let shop = Workshop::new();
+    std::fs::remove_file(shop.path("box.off")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(shop.path("box.off")).status().unwrap().success());
+    let dropped = "what was in work is dropped";
+    for signals in [&["-TERM"][..], &["-INT"], &["-INT", "-INT"], &["-TERM", "-INT"]] {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
+            .current_dir(shop.folder.path())
+            .args(["run", "box.toml"])
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        // The handler is there before the pipeline is looked at; the process must have come so far.
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        for signal in signals {
+            assert!(
+                std::process::Command::new("kill")
+                    .arg(signal)
+                    .arg(child.id().to_string())
+                    .status()
+                    .unwrap()
+                    .success()
+            );
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        let mut stderr = String::new();
+        std::io::Read::read_to_string(&mut child.stderr.take().unwrap(), &mut stderr).unwrap();
+        assert!(stderr.contains("stopping; once more to stop at once"), "{stderr}");
+        // The second one does not wait for what the first has begun.
+        assert_eq!(stderr.contains(dropped), signals.len() == 1, "{stderr}");
+    }
+}
+
+/// Whatever moment a process dies at, what it leaves is whole or not there.
+#[cfg(unix)]
+#[test]
+fn killed_runs_leave_nothing_that_misleads_the_next_one() {
+    let names = |shop: &Workshop| -> Vec<PathBuf> {
+        let root = shop.path(".topipe");
+        ["artifacts-v1", "keys-v1"]
+            .iter()
+            .flat_map(|bucket| files_below(&root.join(bucket)))
+            .map(|file| file.strip_prefix(&root).unwrap().to_owned())
+            .collect()
+    };
+    let clean = Workshop::new();
+    clean.events(&[]);
+    let shop = Workshop::new();
+    // More of them with `just kills`.
+    let rounds = std::env::var("TOPIPE_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(16);
+    for round in 0..rounds {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
+            .current_dir(shop.folder.path())
+            .args(["-q", "run", "box.toml"])
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_micros(1500 * (7 * round % 32)));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    let last = shop.topipe(&["run", "box.toml"]);
+    for folder in ["locks-v1", "leases-v1", "tmp"] {
+        assert_eq!(files_below(&shop.path(".topipe").join(folder)), Vec::<PathBuf>::new());
+    }
+    let outputs = |shop: &Workshop| files_below(&shop.path("topipe-out/box")).len();
+    assert_eq!(outputs(&shop), outputs(&clean));
+    assert_eq!(last.code, 0, "{}", last.stderr);
+    assert_eq!(names(&shop), names(&clean));
+    assert_eq!(shop.events(&[]), NOTHING);
+    assert_eq!(shop.topipe(&["cache", "verify"]).code, 0);
+    assert_eq!(shop.read("topipe-out/box/report.json"), clean.read("topipe-out/box/report.json"));
+}
+
+/// Runs until `percent` of the patches are done, sends a signal, and returns how many were.
+#[cfg(unix)]
+fn stopped_in_the_fit(shop: &Workshop, percent: u64, signal: &str) -> (u64, u64) {
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
+        .current_dir(shop.folder.path())
+        .args(["run", "box.toml", "--json"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut lines = std::io::BufRead::lines(std::io::BufReader::new(child.stdout.take().unwrap()));
+    let reached = lines.find_map(|line| {
+        let event: Value = serde_json::from_str(&line.unwrap()).unwrap();
+        let number = |name: &str| event[name].as_u64().unwrap_or(0);
+        let (done, total) = (number("done"), number("total"));
+        let there = event["stage"] == "fit" && event["what"] == "patches" && 100 * done >= percent * total;
+        there.then_some((done, total))
+    });
+    let reached = reached.expect("the fit tells how far it is");
+    let id = child.id().to_string();
+    assert!(std::process::Command::new("kill").args([signal, &id]).status().unwrap().success());
+    // Read to its end, so that the process never waits for us.
+    let rest: Vec<String> = lines.map_while(Result::ok).collect();
+    let code = child.wait().unwrap().code();
+    assert_eq!(code, (signal == "-INT").then_some(130), "{rest:#?}");
+    reached
+}
+
+/// A long fit that is interrupted, goes on, and dies near its end is taken up there: what was finished is found again,
+/// plan says so beforehand, and the surface is the one of a run that was left alone.
+#[cfg(unix)]
+#[test]
+fn a_fit_interrupted_and_killed_near_its_end_is_taken_up_there() {
+    let killed = Workshop::with_part("y-form", FIT);
+    // First it is asked to stop, at a third; then it is killed.
+    let (done, total) = stopped_in_the_fit(&killed, 30, "-INT");
+    assert!(done < total);
+    let (done, total) = stopped_in_the_fit(&killed, 80, "-KILL");
+    let plan = killed.topipe(&["plan", "box.toml"]);
+    assert!(plan.stdout.contains(&format!("of {total} patches")), "{}", plan.stdout);
+    let ended = killed.topipe(&["run", "box.toml", "--json"]);
+    assert_eq!(ended.code, 0, "{}", ended.stderr);
+    let events: Vec<Value> = ended.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let units = events.iter().find(|e| e["event"] == "stage-units" && e["stage"] == "fit").unwrap();
+    let (reused, computed) = (units["reused"].as_u64().unwrap(), units["computed"].as_u64().unwrap());
+    assert_eq!(reused + computed, total);
+    // At most the patches in the making are lost, one a thread.
+    assert!(reused + 64 >= done, "{reused} of {done} found again");
+    let clean = Workshop::with_part("y-form", FIT);
+    assert_eq!(clean.topipe(&["-q", "run", "box.toml"]).code, 0);
+    assert_eq!(killed.read("topipe-out/box/part.step"), clean.read("topipe-out/box/part.step"));
+}
