@@ -13,6 +13,8 @@ pub struct SweepTable {
     pub header: Vec<String>,
     /// The rows in the order of the variants.
     pub rows: Vec<Vec<String>>,
+    /// Columns that name files where cases have names that say the same shorter: in the CSV only.
+    files: Vec<usize>,
 }
 
 impl SweepTable {
@@ -67,7 +69,15 @@ impl SweepTable {
                 cells
             })
             .collect();
-        Some(Self { header, rows })
+        let named_cases = sweep.variants.iter().any(|variant| variant.case.is_some());
+        let names_file = |field: &str| {
+            let (stage, field) = field.split_once('.').unwrap_or_default();
+            let node = pipeline.stages.iter().find(|node| node.base == stage);
+            node.is_some_and(|node| node.stage.files().iter().any(|file| file.name == field))
+        };
+        let files =
+            (0..fields.len()).filter(|&k| named_cases && names_file(fields[k])).map(|k| k + 1).collect();
+        Some(Self { header, rows, files })
     }
 
     /// As CSV (RFC 4180, with line feeds).
@@ -83,20 +93,44 @@ impl SweepTable {
         std::iter::once(&self.header).chain(&self.rows).map(line).collect()
     }
 
-    /// For people, in columns.
+    /// For people, in columns: names no longer than need be, five digits.
     pub fn text(&self) -> String {
-        let width = |column: usize| {
-            let all = std::iter::once(&self.header).chain(&self.rows);
-            all.map(|cells| cells[column].chars().count()).max().unwrap_or(0)
-        };
-        let widths: Vec<usize> = (0..self.header.len()).map(width).collect();
+        let shown: Vec<usize> =
+            (0..self.header.len()).filter(|column| !self.files.contains(column)).collect();
+        let names: Vec<&str> = shown.iter().map(|&column| self.header[column].as_str()).collect();
+        let mut lines: Vec<Vec<String>> = vec![names.iter().map(|name| shortest(name, &names)).collect()];
+        lines.extend(
+            self.rows.iter().map(|cells| shown.iter().map(|&column| rounded(&cells[column])).collect()),
+        );
+        let width =
+            |column: usize| lines.iter().map(|cells| cells[column].chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..shown.len()).map(width).collect();
         let line = |cells: &Vec<String>| {
             let padded: Vec<String> =
                 cells.iter().zip(&widths).map(|(cell, width)| format!("{cell:width$}")).collect();
             format!("{}\n", padded.join("  ").trim_end())
         };
-        std::iter::once(&self.header).chain(&self.rows).map(line).collect()
+        lines.iter().map(line).collect()
     }
+}
+
+/// The last parts of a name that no other one ends with; of a figure deep in a report at least two, `deviation.max_mm`.
+fn shortest(name: &str, all: &[&str]) -> String {
+    let ends = |other: &str, end: &str| other == end || other.ends_with(&format!(".{end}"));
+    let starts = std::iter::once(0).chain(name.match_indices('.').map(|(at, _)| at + 1));
+    let mut candidates: Vec<&str> = starts.map(|at| &name[at..]).collect();
+    candidates.reverse();
+    candidates.drain(..usize::from(candidates.len() > 3));
+    let only = candidates.iter().find(|end| all.iter().filter(|other| ends(other, end)).count() == 1);
+    only.copied().unwrap_or(name).to_owned()
+}
+
+/// A number with a fraction to five digits; anything else as it is.
+fn rounded(cell: &str) -> String {
+    let number = cell.contains(['.', 'e', 'E']).then(|| cell.parse::<f64>().ok()).flatten();
+    let Some(exact) = number.filter(|number| number.is_finite()) else { return cell.to_owned() };
+    let value: f64 = format!("{exact:.4e}").parse().unwrap_or(exact);
+    if value == 0.0 || (1e-4..1e7).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
 
 fn usual_figures(pipeline: &Pipeline, sweep: &Sweep, usual: &[(&str, &str)]) -> Vec<Figure> {
@@ -150,5 +184,24 @@ fn plain(value: &Value, path: &[String]) -> Option<String> {
         Value::Array(items) => Some(items.len().to_string()),
         Value::Null | Value::Object(_) => None,
         other => Some(other.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn people_see_short_names_and_few_digits() {
+        let row = ["a=1", "1", "a/b.stl", "0.123456789", "-2.1094237467877974e-15", "12345678", "true"];
+        let names = ["variant", "s.a", "m.path", "c.x.max", "c.y.max", "c.y.d.n", "c.done"];
+        let own = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
+        let table = SweepTable { header: own(&names), rows: vec![own(&row)], files: vec![2] };
+        assert_eq!(
+            table.text(),
+            "variant  a  x.max    y.max        d.n       done\n\
+             a=1      1  0.12346  -2.1094e-15  12345678  true\n"
+        );
+        assert!(table.csv().contains("a/b.stl,0.123456789,-2.1094237467877974e-15"), "{}", table.csv());
     }
 }

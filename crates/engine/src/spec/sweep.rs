@@ -35,6 +35,8 @@ pub struct Sweep {
 pub struct Variant {
     /// What it is called; the folder of its exports.
     pub name: String,
+    /// The name of its case, if it has one.
+    pub case: Option<String>,
     /// `STAGE.FIELD` and value, in the order of the spec.
     pub values: Vec<(String, String)>,
     /// For each stage of the spec its name and the index of the stage of the graph that plays it.
@@ -316,6 +318,7 @@ pub(super) fn merge(
         }
         merged.variants.push(Variant {
             name,
+            case: draft.name.clone(),
             values: draft
                 .settings
                 .iter()
