@@ -88,9 +88,17 @@ damage rounds="1000":
 batch parts="1000" seed="1":
     TOPIPE_BATCH={{parts}} TOPIPE_BATCH_SEED={{seed}} cargo test --release -p topipe-validation --test batch -- --nocapture
 
+# The remote cache in a bucket, against a server on this machine. Apart from the other tests: the feature brings an HTTP client.
+s3:
+    cargo test -p topipe --features s3 --test command s3::
+
 # Feed the readers of meshes, specs and artifacts with mangled files, so many times each.
 fuzz executions="10000000" seed="1":
     ulimit -v 8000000; TOPIPE_FUZZ={{executions}} TOPIPE_FUZZ_SEED={{seed}} cargo test --release -p topipe --test fuzz
+
+# The same, and what leads somewhere new is added to tests/corpus.
+fuzz-corpus executions="200000" seed="1":
+    TOPIPE_FUZZ={{executions}} TOPIPE_FUZZ_SEED={{seed}} TOPIPE_FUZZ_KEEP=1 cargo test --release -p topipe --test fuzz
 
 # Time of a run with nothing to do, beside DVC and Snakemake.
 nothing-to-do:

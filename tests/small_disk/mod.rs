@@ -3,7 +3,7 @@
 //! A script finds a file system of its own at `$DISK`: a `tmpfs` in a name space that ends with the script. Where nothing may
 //! be mounted, as in most containers, and beside it everywhere else, a small library that stands before the C library
 //! answers writes below `$DISK` as a full disk does. In the script, `fill BYTES` leaves so much room and `make_room` takes
-//! that back.
+//! that back; a mounted one can `make_read_only`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -24,6 +24,7 @@ fill() {
     head -c $(($(df -B1 --output=avail "$DISK" | tail -n 1) - $1)) /dev/zero > "$DISK/ballast"
 }
 make_room() { rm "$DISK/ballast"; }
+make_read_only() { mount -o remount,ro "$DISK"; }
 "#;
 
 const PRELOAD: &str = r#"

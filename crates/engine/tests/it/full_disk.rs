@@ -60,13 +60,17 @@ impl Left {
     /// Runs `script` on each disk there is. In it, `meet LOG CACHE ..` runs the pipeline, whose folder is the disk, and
     /// `$KEPT` is a folder that stays.
     fn on_each_disk(script: &str, check: impl Fn(&Self)) {
+        Self::on_disks(|_| true, script, check);
+    }
+
+    fn on_disks(these: impl Fn(&SmallDisk) -> bool, script: &str, check: impl Fn(&Self)) {
         let mut clean = Workshop::new(SPEC);
         clean.registry = registry().with_stage(Shout::default());
         clean.write("in.txt", &text());
         assert_eq!(clean.run().0.exit_code, 0);
         let mut left = Self { folder: tempfile::tempdir().unwrap(), clean };
         let library = tempfile::tempdir().unwrap();
-        for disk in SmallDisk::all(library.path()) {
+        for disk in SmallDisk::all(library.path()).into_iter().filter(these) {
             let kept = tempfile::tempdir().unwrap();
             let mounted = kept.path().join("disk");
             std::fs::create_dir(&mounted).unwrap();
@@ -229,5 +233,29 @@ echo $? > "$KEPT/code"
         let told = line(&log, "record not written: cannot write ");
         assert!(told.contains("/out/run.json: ") && told.contains(ADVICE), "{told}");
         assert_eq!(log.lines().next_back(), Some("storage"));
+    });
+}
+
+/// A disk that can only be read, where one can be mounted; `trouble.rs` has a cache that nobody can write anywhere.
+#[test]
+fn from_a_read_only_disk_everything_is_found_and_only_the_record_is_missing() {
+    let script = r#"
+meet "$KEPT/log0" "$DISK/cache"
+make_read_only
+meet "$KEPT/log" "$DISK/cache"
+echo $? > "$KEPT/code"
+"#;
+    let mounted = |disk: &SmallDisk| matches!(disk, SmallDisk::Mounted(_));
+    Left::on_disks(mounted, script, |left| {
+        assert_eq!(left.read("code").trim(), "4");
+        let log = left.read("log");
+        let log: Vec<&str> = log.lines().skip(1).collect();
+        let found =
+            ["read cached", "loud cached", "size cached", "loud.txt up to date", "size.json up to date"];
+        assert_eq!(log[..5], found);
+        assert!(log[5].starts_with("record not written: cannot write "), "{}", log[5]);
+        assert!(log[5].contains("Read-only file system (os error 30)"), "{}", log[5]);
+        assert!(log[5].ends_with("; take another folder (`--cache`, `--out`)"), "{}", log[5]);
+        assert_eq!(log[6..], ["storage"]);
     });
 }

@@ -32,6 +32,8 @@ fn prepare(shop: &mut Workshop) {
     shop.registry = registry().with_stage(Shout::default());
 }
 
+const WORDS: usize = 5;
+
 fn shop() -> Workshop {
     let mut shop = Workshop::new(SPEC);
     prepare(&mut shop);
@@ -41,8 +43,15 @@ fn shop() -> Workshop {
 
 static PASSED: AtomicUsize = AtomicUsize::new(0);
 static LAST: AtomicUsize = AtomicUsize::new(usize::MAX);
+static UNITS: AtomicUsize = AtomicUsize::new(0);
 
-fn die_in_time(_: &'static str) {
+fn die_in_time(name: &'static str) {
+    if name == "unit put" {
+        UNITS.fetch_add(1, Ordering::SeqCst);
+    }
+    if PASSED.load(Ordering::SeqCst) == LAST.load(Ordering::SeqCst) {
+        std::fs::write(child::folder().join("units"), UNITS.load(Ordering::SeqCst).to_string()).unwrap();
+    }
     if PASSED.fetch_add(1, Ordering::SeqCst) == LAST.load(Ordering::SeqCst) {
         child::kill_myself();
     }
@@ -103,7 +112,7 @@ fn outputs(folder: &Path) -> BTreeSet<PathBuf> {
 }
 
 /// A run after kills: it succeeds, equals a clean one, and nothing else is left.
-fn expect_clean(shop: &Workshop, clean: &Workshop, context: &str) {
+fn expect_clean(shop: &Workshop, clean: &Workshop, context: &str) -> Vec<String> {
     let (record, log) = shop.run();
     assert_eq!(record.exit_code, 0, "{context}: {log:#?}");
     assert!(!log.iter().any(|line| line.contains("quarantined")), "{context}: {log:#?}");
@@ -120,6 +129,7 @@ fn expect_clean(shop: &Workshop, clean: &Workshop, context: &str) {
         assert_eq!(shop.out(file), clean.out(file), "{context}");
     }
     assert_eq!(shop.cache().verify().unwrap().1, [], "{context}");
+    log
 }
 
 #[test]
@@ -136,7 +146,7 @@ fn a_run_passes_every_commit_point() {
 fn killed_at_each_commit_point_the_next_run_is_a_clean_one() {
     let clean = shop();
     clean.run();
-    let mut point = 0;
+    let (mut point, mut within) = (0, 0);
     loop {
         let shop = shop();
         let status =
@@ -147,13 +157,18 @@ fn killed_at_each_commit_point_the_next_run_is_a_clean_one() {
             assert!(status.success());
             break;
         }
-        // At most the unit that was being made is made again.
-        let kept = shop.cache().files(Bucket::Units).unwrap().len();
-        expect_clean(&shop, &clean, &format!("commit point {point}, {kept} segments"));
+        let log = expect_clean(&shop, &clean, &format!("commit point {point}"));
+        // All units but the one that was being made are found again.
+        let put: usize = std::fs::read_to_string(shop.path("units")).unwrap().parse().unwrap();
+        if let Some(line) = log.iter().find(|line| line.starts_with("loud units: ")) {
+            assert_eq!(line, &format!("loud units: {put} reused, {} computed", WORDS - put), "point {point}");
+            within += usize::from(put > 0);
+        }
         point += 1;
     }
     // Four stages of at least four commits each, five units, two exports, records.
     assert!(point > 30, "only {point} commit points");
+    assert!(within >= WORDS, "only {within} of them with units to find again");
 }
 
 /// Random moments: more with `TOPIPE_KILLS=300` (`just kills`).
