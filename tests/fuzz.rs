@@ -1,12 +1,16 @@
 //! Readers of foreign bytes fed with what nobody would write: no panic, no hang, no absurd allocation.
 //!
 //! A deterministic mutation fuzzer: inputs start from the corpus (fixtures/zoo, tests/corpus and small files made here),
-//! are mangled by bytes, numbers, words and pieces of each other, and are read. An input that made trouble is written to
-//! `target/fuzz` before anything else is done with it, and belongs into `tests/corpus/TARGET` once it is understood.
+//! are mangled by bytes, numbers, words and pieces of each other, and are read. What comes of an input, its message or what
+//! was repaired, leads the way: an input with which something comes for the first time is mangled further, so that the
+//! fuzzer gets behind the first check. With `TOPIPE_FUZZ_KEEP=1` such inputs are written to `tests/corpus/TARGET`, which is
+//! where the corpus there is from. An input that made trouble is written to `target/fuzz` before anything else is done with
+//! it, and belongs into the corpus once it is understood.
 //!
 //! Each target runs some thousand times with all other tests, and as often as wanted by
 //! `just fuzz 10000000` (`TOPIPE_FUZZ=10000000`), which also varies with `TOPIPE_FUZZ_SEED`.
 
+use std::collections::BTreeSet;
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -119,29 +123,71 @@ fn mutate(random: &mut Random, seeds: &[Vec<u8>]) -> Vec<u8> {
 /// Longer than this for an input of 20 kB is a hang.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-fn fuzz(target: &str, seeds: &[Vec<u8>], read: impl Fn(&[u8])) {
+/// Inputs that lead somewhere new are mangled further, up to so many.
+const MOST_SEEDS: usize = 2_000;
+
+/// Longer inputs are not kept, and no more than so many for a target.
+const KEPT_LENGTH: usize = 3_000;
+const MOST_KEPT: usize = 80;
+
+fn fuzz(target: &str, seeds: &[Vec<u8>], read: impl Fn(&[u8]) -> String) {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
     let rounds = number("TOPIPE_FUZZ").unwrap_or(3000);
+    let keep = std::env::var_os("TOPIPE_FUZZ_KEEP").is_some();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut random = Random(number("TOPIPE_FUZZ_SEED").unwrap_or(1) ^ target.len() as u64);
     std::panic::set_hook(Box::new(|_| {}));
     assert!(!seeds.is_empty(), "{target} has no seeds");
     let run = |bytes: &[u8]| {
         let start = Instant::now();
         let result = std::panic::catch_unwind(AssertUnwindSafe(|| read(bytes)));
-        if result.is_err() || start.elapsed() > PATIENCE {
-            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/fuzz");
-            std::fs::create_dir_all(&folder).unwrap();
-            let file = folder.join(format!("{target}-{}", &blake3_name(bytes)));
-            std::fs::write(&file, bytes).unwrap();
-            let what = if result.is_err() { "panics on" } else { "hangs on" };
-            panic_with(format!("{target} {what} {}", file.display()));
-        }
+        let what = match result {
+            Ok(outcome) if start.elapsed() <= PATIENCE => return outcome,
+            Ok(_) => "hangs on",
+            Err(_) => "panics on",
+        };
+        let folder = root.join("target/fuzz");
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = folder.join(format!("{target}-{}", &blake3_name(bytes)));
+        std::fs::write(&file, bytes).unwrap();
+        panic_with(format!("{target} {what} {}", file.display()));
     };
     // The seeds as they are, among them all that ever made trouble.
-    seeds.iter().for_each(|seed| run(seed));
+    let mut known: BTreeSet<String> = seeds.iter().map(|seed| kind_of(&run(seed))).collect();
+    let mut seeds = seeds.to_vec();
     for _ in 0..rounds {
-        run(&mutate(&mut random, seeds));
+        let bytes = mutate(&mut random, &seeds);
+        let kind = kind_of(&run(&bytes));
+        if seeds.len() < MOST_SEEDS && !known.contains(&kind) {
+            known.insert(kind);
+            if keep && bytes.len() <= KEPT_LENGTH {
+                let folder = root.join("tests/corpus").join(target);
+                std::fs::create_dir_all(&folder).unwrap();
+                if std::fs::read_dir(&folder).unwrap().count() < MOST_KEPT {
+                    std::fs::write(folder.join(blake3_name(&bytes)), &bytes).unwrap();
+                }
+            }
+            seeds.push(bytes);
+        }
     }
+}
+
+/// An outcome without numbers and without what it quotes, of which there is too much.
+fn kind_of(outcome: &str) -> String {
+    // Pieces of repairs and of several outcomes, each up to what it quotes.
+    let unquoted = |piece: &str| {
+        let ends = ["`", "\"", ": '", " found "].map(|quote| piece.find(quote));
+        piece[..ends.into_iter().flatten().min().unwrap_or(piece.len())].to_owned()
+    };
+    let text: String = outcome.split("; ").map(unquoted).collect::<Vec<_>>().join("; ");
+    let digits = |c: char| c.is_ascii_digit() || "+-.,".contains(c) || !c.is_ascii();
+    text.split(digits)
+        .filter(|part| !part.is_empty())
+        .collect::<Vec<_>>()
+        .join("#")
+        .chars()
+        .take(120)
+        .collect()
 }
 
 fn panic_with(message: String) -> ! {
@@ -182,8 +228,9 @@ fn tetrahedron() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
 fn mesh(target: &str, ending: &str, mut seeds: Vec<Vec<u8>>) {
     seeds.extend(corpus(target, &[ending]));
     let name = format!("part.{ending}");
-    fuzz(target, &seeds, |bytes| {
-        let _ = topipe_mesh::import::read(&name, bytes, &Default::default());
+    fuzz(target, &seeds, |bytes| match topipe_mesh::import::read(&name, bytes, &Default::default()) {
+        Ok(part) => format!("{:?}", part.import.repairs),
+        Err(error) => error.to_string(),
     });
 }
 
@@ -264,11 +311,11 @@ fn spec() {
     );
     let registry = topipe::stages::registry();
     fuzz("spec", &seeds, |bytes| {
-        if let Ok(text) = std::str::from_utf8(bytes) {
-            // A message must be printable, whatever it points at.
-            if let Err(error) = Pipeline::parse(Path::new("p.toml"), text.to_owned(), &[], &registry) {
-                assert!(error.to_string().starts_with("error: "));
-            }
+        let Ok(text) = std::str::from_utf8(bytes) else { return String::new() };
+        // A message must be printable, whatever it points at.
+        match Pipeline::parse(Path::new("p.toml"), text.to_owned(), &[], &registry) {
+            Ok(pipeline) => format!("{} stages", pipeline.stages.len()),
+            Err(error) => first_line(&error),
         }
     });
 }
@@ -280,11 +327,21 @@ fn command_line_values() {
     let registry = topipe::stages::registry();
     let seeds = [&b"b.lambda=0.5"[..], b"b.method=taubin", b"b.path=\"x\"", b"a.non_design=[{type=\"box\"}]"];
     fuzz("set", &seeds.map(<[u8]>::to_vec), |bytes| {
-        let Some(over) = std::str::from_utf8(bytes).ok().and_then(|text| text.parse().ok()) else { return };
-        if let Err(error) = Pipeline::parse(Path::new("p.toml"), spec.to_owned(), &[over], &registry) {
-            assert!(error.to_string().starts_with("error: "));
+        let Some(over) = std::str::from_utf8(bytes).ok().and_then(|text| text.parse().ok()) else {
+            return String::new();
+        };
+        match Pipeline::parse(Path::new("p.toml"), spec.to_owned(), &[over], &registry) {
+            Ok(_) => "good".into(),
+            Err(error) => first_line(&error),
         }
     });
+}
+
+/// The message without the line of the spec that it shows.
+fn first_line(error: &topipe_engine::Diagnostic) -> String {
+    let text = error.to_string();
+    assert!(text.starts_with("error: "), "{text}");
+    text.lines().next().unwrap_or_default().to_owned()
 }
 
 /// Whole files, and payloads under a header that vouches for them: what a hostile hand would write.
@@ -298,8 +355,12 @@ where
     seeds.push(vec![0; 64]);
     seeds.push([(1u64 << 61).to_le_bytes(), [0xFF; 8]].concat());
     fuzz(&target, &seeds, |bytes| {
-        let _ = codec::decode::<K::Value>(bytes, K::NAME, K::VERSION);
-        let _ = codec::decode::<K::Value>(&codec::frame(bytes, K::NAME, K::VERSION), K::NAME, K::VERSION);
+        let framed = codec::frame(bytes, K::NAME, K::VERSION);
+        let told = [bytes, &framed].map(|file| match codec::decode::<K::Value>(file, K::NAME, K::VERSION) {
+            Ok(_) => "good".to_owned(),
+            Err(error) => error.to_string(),
+        });
+        told.join("; ")
     });
 }
 
