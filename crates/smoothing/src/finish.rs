@@ -10,12 +10,15 @@
 //!   What is left then is searched for a better place, vertex by vertex (`relief`).
 //!   (Umbrella steps for all four vertices thin out the base of a knife edge as fast as its ridge and made more spikes
 //!   than they took.)
+//! - *Folds*: faces that point against the mean of their neighbours without a spike at their edges are searched in the same way, and
+//!   what is left becomes a membrane (`unfold`).
 //! - *Crossings*: the vertices of triangles that pass through each other, and a ring more in each round, go back half
 //!   of the way to the input, which does not pass through itself. In the end they are there; so this ends.
 //!
 //! Both keep frozen vertices, shapes of regions and the volume.
 
 mod relief;
+mod unfold;
 
 use crate::SmoothingError;
 use crate::kernel::{CHUNK, Domain, umbrella};
@@ -62,6 +65,8 @@ pub(crate) struct Finish<'a> {
 pub(crate) struct Mended {
     pub(crate) spikes_before: usize,
     pub(crate) spikes_after: usize,
+    pub(crate) folds_before: usize,
+    pub(crate) folds_after: usize,
     pub(crate) crossings: usize,
 }
 
@@ -80,11 +85,29 @@ impl Finish<'_> {
         if self.embedded {
             self.part_crossings(current, keeper, &mut mended, progress)?;
         }
+        if self.spikes {
+            let folds = self.folds(current);
+            let before = folds.len();
+            if before > 0 && self.unfold(current, folds) < before {
+                self.restore(current, keeper);
+                if self.embedded {
+                    self.part_crossings(current, keeper, &mut mended, progress)?;
+                }
+            }
+            mended.folds_after = self.folds(current).len();
+            mended.spikes_after = self.spikes(current).len();
+        }
         Ok(mended)
     }
 
     fn is_free(&self, v: usize) -> bool {
         !self.domain.row(v).is_empty()
+    }
+
+    /// The place nearest to `here` where `v` may be.
+    fn allowed(&self, v: usize, here: DVec3) -> DVec3 {
+        let slide = self.domain.slides.binary_search_by_key(&(v as u32), |s| s.vertex);
+        slide.map_or(here, |k| self.domain.slides[k].nearest(self.mesh.positions[v], here))
     }
 
     fn restore(&self, current: &mut [DVec3], keeper: &mut Option<VolumeKeeper>) {
@@ -131,6 +154,7 @@ impl Finish<'_> {
     ) -> Result<(), SmoothingError> {
         let mut spikes = self.spikes(current);
         mended.spikes_before = spikes.len();
+        mended.folds_before = self.folds(current).len();
         let mut next = current.clone();
         for _ in 0..SPIKE_ROUNDS {
             if spikes.is_empty() {
@@ -144,10 +168,9 @@ impl Finish<'_> {
             std::mem::swap(current, &mut next);
             spikes = self.spikes(current);
         }
-        if !spikes.is_empty() && self.relieve(current, &spikes) {
-            spikes = self.spikes(current);
+        if !spikes.is_empty() {
+            self.relieve(current, &self.around_spikes(&spikes), self.spike);
         }
-        mended.spikes_after = spikes.len();
         if mended.spikes_before > 0 {
             self.restore(current, keeper);
         }
@@ -207,7 +230,7 @@ impl Finish<'_> {
         // What the input does already is not for smoothing to mend.
         let known: Vec<[FaceId; 2]> = crossings(self.mesh).into_iter().map(|c| c.faces).collect();
         found.retain(|c| known.binary_search(&c.faces).is_err());
-        mended.crossings = found.len();
+        mended.crossings += found.len();
         let mut marked = vec![false; current.len()];
         let mut round = 0;
         while !found.is_empty() {

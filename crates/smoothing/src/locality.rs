@@ -30,25 +30,33 @@ impl Order {
     }
 
     fn breadth_first(mesh: &TriangleMesh) -> Self {
-        let curve = Self::from_vertices(mesh, along_curve(mesh));
+        // The faces of a file can have any order: they are looked at once to sort them along the curve, and from there on in that order.
+        let curve = Self::along(along_curve(mesh), mesh.triangles.as_slice(), |v: &VertexId| v.index());
         let along: Vec<[u32; 3]> = curve
             .old_face
             .par_iter()
             .map(|&f| mesh.triangles[f as usize].map(|v| curve.new[v.index()]))
             .collect();
-        let search = search(&along, curve.old.len());
-        Self::from_vertices(mesh, search.into_iter().map(|v| curve.old[v as usize]).collect())
+        let search = Self::along(search(&along, curve.old.len()), &along, |v: &u32| *v as usize);
+        drop(along);
+        // One after the other.
+        let through = |outer: &[u32], inner: &[u32]| inner.par_iter().map(|&i| outer[i as usize]).collect();
+        Self {
+            old: through(&curve.old, &search.old),
+            new: through(&search.new, &curve.new),
+            old_face: through(&curve.old_face, &search.old_face),
+        }
     }
 
     /// The numbering with these old vertices; faces in the order of their first ones.
-    fn from_vertices(mesh: &TriangleMesh, old: Vec<u32>) -> Self {
+    fn along<T: Sync>(old: Vec<u32>, triangles: &[[T; 3]], index: impl Fn(&T) -> usize + Sync) -> Self {
         let mut new = vec![0; old.len()];
         for (n, &o) in old.iter().enumerate() {
             new[o as usize] = n as u32;
         }
         // A counting sort: linear, and faces with the same first vertex keep their order.
         let first: Vec<u32> =
-            mesh.triangles.par_iter().map(|t| t.iter().map(|v| new[v.index()]).min().unwrap_or(0)).collect();
+            triangles.par_iter().map(|t| t.iter().map(|v| new[index(v)]).min().unwrap_or(0)).collect();
         let mut place = vec![0u32; old.len() + 1];
         first.iter().for_each(|&v| place[v as usize + 1] += 1);
         for v in 1..place.len() {

@@ -1,11 +1,12 @@
 //! The loop: freeze, step, project, restore the volume, stop.
 
 use crate::alpha;
+use crate::blocks::Blocks;
 use crate::features::{self, Features};
 use crate::finish::{Finish, Mended};
 use crate::kernel::{Change, Domain, Slide};
 use crate::locality::Order;
-use crate::methods;
+use crate::methods::{self, Step};
 use crate::outline::OutlineGuard;
 use crate::volume::{VolumeKeeper, six_volumes};
 use crate::{Method, Parameters, SmoothingError};
@@ -293,9 +294,13 @@ fn iterate(
         let mended = finish.mend(&mut current, progress)?;
         if mended != Mended::default() {
             progress.remark(&format!(
-                "{} edges were sharper than `spike_angle`, {} still are; {} pairs of triangles passed through each other \
-                 and were parted",
-                mended.spikes_before, mended.spikes_after, mended.crossings
+                "{} edges were sharper than `spike_angle`, {} still are; {} faces pointed against their neighbours, {} still \
+                 do; {} pairs of triangles passed through each other and were parted",
+                mended.spikes_before,
+                mended.spikes_after,
+                mended.folds_before,
+                mended.folds_after,
+                mended.crossings
             ));
         }
     }
@@ -310,6 +315,72 @@ struct Run<'a> {
     guard: &'a OutlineGuard,
     edge: f64,
     free: usize,
+}
+
+impl Run<'_> {
+    /// Writes an iteration down, and returns the root mean square of its steps in mean edge lengths.
+    fn note(
+        &self,
+        iteration: u32,
+        change: Change,
+        record: &mut SmoothingRecord,
+    ) -> Result<f64, SmoothingError> {
+        let rms = (change.squares / self.free as f64).sqrt() / self.edge;
+        record.iterations = iteration;
+        record.cumulative_change += change.distances;
+        record.rms_steps.push(rms);
+        if !rms.is_finite() || rms > DIVERGED {
+            return Err(SmoothingError::Diverged { iteration, step: rms });
+        }
+        Ok(rms)
+    }
+}
+
+/// Iterations of which several are made at once.
+struct Journeys<'a> {
+    setup: &'a Run<'a>,
+    blocks: &'a Blocks,
+    tolerance: f64,
+    most: u32,
+}
+
+impl Journeys<'_> {
+    /// Iterates until the step is small.
+    fn run(
+        &self,
+        step: &mut dyn Step,
+        current: &mut Vec<DVec3>,
+        progress: &Progress,
+        record: &mut SmoothingRecord,
+    ) -> Result<(), SmoothingError> {
+        let Run { mesh, domain, .. } = *self.setup;
+        let at_once = step.most_at_once();
+        let mut journey = |current: &mut Vec<DVec3>, iterations| {
+            step.journey(self.blocks, domain, &mesh.positions, current, iterations)
+        };
+        let mut done = 0;
+        let mut before = Vec::new();
+        while done < self.most {
+            progress.check()?;
+            if self.tolerance > 0.0 {
+                before.clone_from(current);
+            }
+            let changes = journey(current, at_once.min(self.most - done));
+            for (k, change) in (1..).zip(changes) {
+                let rms = self.setup.note(done + k, change, record)?;
+                if rms < self.tolerance {
+                    // Those that came after are taken back.
+                    current.clone_from(&before);
+                    journey(current, k);
+                    record.converged = true;
+                    return Ok(());
+                }
+            }
+            done = record.iterations;
+            progress.step(done.into(), self.most.into(), "iterations");
+        }
+        Ok(())
+    }
 }
 
 /// The iteration itself.
@@ -333,8 +404,16 @@ fn run(
     };
     let mut step = methods::choose(parameters, domain, original);
     let mut current = original.clone();
-    let mut next = original.clone();
     let most = parameters.most_iterations();
+    // Where nothing looks at the mesh between two iterations, several can be made at once.
+    let nobody_looks = keeper.is_none() && domain.slides.is_empty() && observe.is_none();
+    if let Some(blocks) = (nobody_looks && step.most_at_once() > 0).then(|| Blocks::of(domain)).flatten() {
+        let journeys = Journeys { setup, blocks: &blocks, tolerance: parameters.tolerance, most };
+        journeys.run(step.as_mut(), &mut current, progress, record)?;
+        record.volumes.push(six_volumes(&mesh.triangles, center, &current) / 6.0);
+        return Ok(current);
+    }
+    let mut next = original.clone();
     for iteration in 1..=most {
         progress.check()?;
         let mut change = step.step(domain, original, &current, &mut next);
@@ -351,18 +430,12 @@ fn run(
         if keeper.is_some() || !domain.slides.is_empty() {
             change = Change::between(&current, &next);
         }
-        let rms = (change.squares / free as f64).sqrt() / edge;
         std::mem::swap(&mut current, &mut next);
-        record.iterations = iteration;
-        record.cumulative_change += change.distances;
-        record.rms_steps.push(rms);
+        let rms = setup.note(iteration, change, record)?;
         if volume.is_finite() {
             record.volumes.push(volume);
         }
         progress.step(iteration.into(), most.into(), "iterations");
-        if !rms.is_finite() || rms > DIVERGED {
-            return Err(SmoothingError::Diverged { iteration, step: rms });
-        }
         let stop = observe.as_mut().is_some_and(|observe| observe(&next, &current, volume));
         if stop || rms < parameters.tolerance {
             record.converged = true;

@@ -3,7 +3,8 @@
 //! A face in a corner of frozen vertices, with one free tip, is sharp along one side as a ridge and along the others as a
 //! valley. Umbrella steps and turns of single faces work against each other there, and some such faces got sharper (120 to 150
 //! degrees on monster-lite). A search over the place of the tip sees all edges of its star at once. Edges beyond 120 degrees on
-//! the nine reference parts went from 122 to 43, faces that point against the mean of their neighbours from 35 to 17.
+//! the nine reference parts went from 122 to 43, faces that point against the mean of their neighbours from 35 to 17; `unfold` takes
+//! on from there.
 
 use super::Finish;
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
@@ -21,8 +22,8 @@ const LEAST_AREA: f64 = 0.5;
 const GAIN: f64 = 0.01;
 
 impl Finish<'_> {
-    /// Moves the free vertices around `spikes`; says whether one was moved.
-    pub(super) fn relieve(&self, positions: &mut [DVec3], spikes: &[HalfEdgeId]) -> bool {
+    /// The vertices around `spikes` that may move freely, in order.
+    pub(super) fn around_spikes(&self, spikes: &[HalfEdgeId]) -> Vec<usize> {
         let c = self.connectivity;
         let mut around: Vec<usize> = spikes
             .iter()
@@ -32,15 +33,20 @@ impl Finish<'_> {
             .collect();
         around.sort_unstable();
         around.dedup();
+        around
+    }
+
+    /// Moves the vertices `around` to where no edge is sharper than `limit`, a cosine, or nearer to that; says whether one was moved.
+    pub(super) fn relieve(&self, positions: &mut [DVec3], around: &[usize], limit: f64) -> bool {
         // The worst first: an order that does not come from the numbering.
-        let excess: Vec<f64> = around.iter().map(|&v| self.star(positions, v).excess).collect();
+        let excess: Vec<f64> = around.iter().map(|&v| self.star(positions, v, limit).excess).collect();
         let mut order: Vec<usize> = (0..around.len()).collect();
         order.sort_by(|&a, &b| excess[b].total_cmp(&excess[a]));
         let mut moved = false;
         for _ in 0..PASSES {
             let mut better = false;
             for &k in &order {
-                better |= self.search(positions, around[k]);
+                better |= self.search(positions, around[k], limit);
             }
             moved |= better;
             if !better {
@@ -51,9 +57,9 @@ impl Finish<'_> {
     }
 
     /// Looks for a better place for `v`.
-    fn search(&self, positions: &mut [DVec3], v: usize) -> bool {
+    fn search(&self, positions: &mut [DVec3], v: usize, limit: f64) -> bool {
         let start = positions[v];
-        let Star { mut excess, area, length, normal, along } = self.star(positions, v);
+        let Star { mut excess, area, length, normal, along } = self.star(positions, v, limit);
         if excess == 0.0 {
             return false;
         }
@@ -65,8 +71,9 @@ impl Finish<'_> {
             let mut best = (excess * (1.0 - GAIN), here);
             for k in 0..27 {
                 let d = (f64::from(k % 3 - 1), f64::from(k / 3 % 3 - 1), f64::from(k / 9 - 1));
-                positions[v] = here + (along * d.0 + across * d.1 + normal * d.2) * (step * length);
-                let star = self.star(positions, v);
+                let tried = here + (along * d.0 + across * d.1 + normal * d.2) * (step * length);
+                positions[v] = self.allowed(v, tried);
+                let star = self.star(positions, v, limit);
                 if star.area >= least && star.excess < best.0 {
                     best = (star.excess, positions[v]);
                 }
@@ -88,7 +95,7 @@ impl Finish<'_> {
     }
 
     /// The surroundings of `v`.
-    fn star(&self, positions: &[DVec3], v: usize) -> Star {
+    fn star(&self, positions: &[DVec3], v: usize, limit: f64) -> Star {
         let c = self.connectivity;
         let at = |v: VertexId| positions[v.index()];
         let area_vector = |f: FaceId| {
@@ -105,7 +112,7 @@ impl Finish<'_> {
                 let twin = c.twin(edge);
                 if twin.is_some() {
                     let cosine = unit.dot(area_vector(twin.face()).normalize_or_zero());
-                    star.excess += (self.spike - cosine).max(0.0).powi(2);
+                    star.excess += (limit - cosine).max(0.0).powi(2);
                 }
             }
             star.area = star.area.min(own.length());

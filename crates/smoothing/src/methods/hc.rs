@@ -3,55 +3,45 @@
 //! Vollmer, Mencl, Müller, "Improved Laplacian smoothing of noisy surface meshes", 1999:
 //! `p = mean_j q_j`, `b = p - (alpha o + (1 - alpha) q)`, `next = p - (beta b + (1 - beta) mean_j b_j)`.
 
-use super::Step;
+use super::{Site, Stencil};
 use crate::Parameters;
-use crate::kernel::{Change, Domain, mean};
 use topipe_mesh::DVec3;
 
-pub(super) struct Hc {
-    alpha: f64,
-    beta: f64,
-    difference: Vec<DVec3>,
+pub(crate) struct Hc {
+    pub(crate) alpha: f64,
+    pub(crate) beta: f64,
 }
 
 impl Hc {
-    pub(super) fn new(parameters: &Parameters, vertices: usize) -> Self {
-        Self {
-            alpha: parameters.alpha.unwrap_or(super::UNSET_ALPHA),
-            beta: parameters.beta,
-            difference: vec![DVec3::ZERO; vertices],
-        }
+    pub(super) fn new(parameters: &Parameters) -> Self {
+        Self { alpha: parameters.alpha.unwrap_or(super::UNSET_ALPHA), beta: parameters.beta }
     }
-}
 
-impl Step for Hc {
-    fn step(&mut self, domain: &Domain, original: &[DVec3], current: &[DVec3], next: &mut [DVec3]) -> Change {
-        let alpha = self.alpha;
-        if alpha == 0.0 {
+    #[inline(always)]
+    fn anchor(&self, site: &Site<'_>, current: DVec3) -> DVec3 {
+        if self.alpha == 0.0 {
             // The input is not looked at: a quarter of what has to be read.
-            self.about(domain, |v| current[v], current, next)
+            current
         } else {
-            self.about(domain, |v| alpha * original[v] + (1.0 - alpha) * current[v], current, next)
+            self.alpha * *site.original + (1.0 - self.alpha) * current
         }
     }
 }
 
-impl Hc {
-    /// A step about anchors.
-    #[inline]
-    fn about(
-        &mut self,
-        domain: &Domain,
-        anchor: impl Fn(usize) -> DVec3 + Sync,
-        current: &[DVec3],
-        next: &mut [DVec3],
-    ) -> Change {
-        let beta = self.beta;
-        domain.sweep(&mut self.difference, |_| DVec3::ZERO, |v, row, _| mean(current, row) - anchor(v));
-        let difference = &self.difference;
-        // p is not stored: it is the difference plus the anchor.
-        domain.advance(current, next, |v, row, _| {
-            anchor(v) + (1.0 - beta) * (difference[v] - mean(difference, row))
-        })
+impl Stencil for Hc {
+    const PASSES: usize = 2;
+
+    #[inline(always)]
+    fn value(&self, stage: usize, site: &Site<'_>) -> DVec3 {
+        if stage == 0 {
+            site.mean() - self.anchor(site, site.here)
+        } else {
+            // p is not stored: it is the difference plus the anchor.
+            self.anchor(site, site.before) + (1.0 - self.beta) * (site.here - site.mean())
+        }
+    }
+
+    fn at_rest(&self, _: DVec3) -> DVec3 {
+        DVec3::ZERO
     }
 }

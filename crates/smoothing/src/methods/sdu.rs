@@ -3,8 +3,8 @@
 //! Desbrun, Meyer, Schröder, Barr, "Implicit fairing of irregular meshes using diffusion and curvature flow", 1999.
 //! A vertex is drawn less by far neighbours than by near ones, so triangles keep their sizes better.
 
-use super::Step;
-use crate::kernel::{Change, Domain, scale_dependent, weighted_umbrella};
+use super::{Site, Stencil};
+use crate::kernel::{Domain, scale_dependent};
 use crate::{Parameters, Weights};
 use topipe_mesh::DVec3;
 
@@ -28,14 +28,25 @@ impl Sdu {
     }
 }
 
-impl Step for Sdu {
-    fn step(&mut self, domain: &Domain, _: &[DVec3], current: &[DVec3], next: &mut [DVec3]) -> Change {
+impl Stencil for Sdu {
+    const PASSES: usize = 1;
+
+    #[inline(always)]
+    fn value(&self, _: usize, site: &Site<'_>) -> DVec3 {
+        site.here + self.lambda * site.weighted_umbrella(&self.weights)
+    }
+
+    fn at_rest(&self, here: DVec3) -> DVec3 {
+        here
+    }
+
+    fn prepare(&mut self, domain: &Domain, current: &[DVec3]) {
         if self.updated {
             scale_dependent(domain, current, self.floor, &mut self.weights);
         }
-        let (lambda, weights) = (self.lambda, &self.weights);
-        domain.advance(current, next, |v, row, first| {
-            current[v] + lambda * weighted_umbrella(current, v, row, &weights[first..first + row.len()])
-        })
+    }
+
+    fn changes(&self) -> bool {
+        self.updated
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{CASES, read, smoothed};
 use topipe_mesh::spatial::crossings;
-use topipe_mesh::{Connectivity, Part, TriangleMesh};
+use topipe_mesh::{Connectivity, DVec3, FaceId, Part, TriangleMesh};
 use topipe_smoothing::{Method, Parameters};
 
 /// Edges with a dihedral angle of more than 120 degrees, and the largest angle.
@@ -14,11 +14,33 @@ fn sharp(mesh: &TriangleMesh) -> (usize, f64) {
     angles.fold((0, 0.0), |(count, largest), a| (count + usize::from(a > 120.0), f64::max(largest, a)))
 }
 
+/// Faces whose normal is more than 120 degrees from the mean of their neighbours'.
+fn folded(mesh: &TriangleMesh) -> Vec<FaceId> {
+    let connectivity = Connectivity::build(mesh).expect("a manifold");
+    let is_folded = |f: &FaceId| {
+        let around: DVec3 = (0..3).map(|k| mesh.normal(connectivity.neighbor(*f, k))).sum();
+        mesh.normal(*f).dot(around.normalize_or_zero()) < -0.5
+    };
+    mesh.faces().filter(is_folded).collect()
+}
+
 #[test]
-fn no_triangle_passes_through_another() {
+fn no_triangle_passes_through_another_or_is_folded() {
     for case in CASES {
-        let result = smoothed(&read(case), &Parameters::default());
+        let part = read(case);
+        assert!(folded(&part.mesh).len() > 5, "{case}");
+        let result = smoothed(&part, &Parameters::default());
         assert_eq!(crossings(&result.mesh), [], "{case}");
+        // What lies between frozen vertices and outlines of faces is the input's.
+        let mut free: Vec<bool> = result.frozen.iter().map(|f| !f).collect();
+        for (t, region) in result.mesh.triangles.iter().zip(&result.region_of_face) {
+            t.iter().for_each(|v| free[v.index()] &= !region.is_some());
+        }
+        let moved = |f: &FaceId| result.mesh.triangles[f.index()].iter().any(|v| free[v.index()]);
+        let mut left = folded(&result.mesh);
+        assert!(left.len() <= 2, "{case}: {left:?}");
+        left.retain(moved);
+        assert_eq!(left, [], "{case}");
     }
 }
 

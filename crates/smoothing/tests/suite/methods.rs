@@ -1,7 +1,7 @@
 //! What each method is known for.
 
 use crate::shapes::{shake, sphere};
-use crate::{read, smoothed};
+use crate::{Noise, read, smoothed};
 use proptest::prelude::*;
 use topipe_mesh::{DVec3, Part, TriangleMesh};
 use topipe_smoothing::{Method, Parameters, Weights};
@@ -153,4 +153,42 @@ proptest! {
             prop_assert_eq!(part.mesh.position(v), result.mesh.position(v));
         }
     }
+}
+
+#[test]
+fn a_large_mesh_stops_at_the_same_iteration_and_state() {
+    // So many vertices that iterations are made several at a time; the step is small enough in the middle of them.
+    let (width, length) = (110, 950);
+    let mut positions = Vec::new();
+    let mut triangles = Vec::new();
+    let mut noise = Noise(5);
+    for i in 0..length {
+        for j in 0..width {
+            positions.push([i as f64, j as f64, 0.3 * noise.next()]);
+            if i > 0 && j > 0 {
+                let v = i * width + j;
+                let [a, b, c, d] = [v, v - 1, v - width - 1, v - width].map(|v| v as u32);
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+    }
+    let part = Part::new(TriangleMesh::from_arrays(positions, triangles));
+    let parameters = Parameters {
+        method: Method::Taubin,
+        detect_planes: false,
+        detect_holes: false,
+        detect_bosses: false,
+        spike_angle: 180.0,
+        keep_embedded: false,
+        iterations: Some(30),
+        tolerance: 0.008,
+        ..Parameters::default()
+    };
+    let stopped = smoothed(&part, &parameters);
+    let record = stopped.smoothing.as_ref().expect("a record");
+    assert!(record.converged && !record.iterations.is_multiple_of(8), "{}", record.iterations);
+    assert_eq!(record.rms_steps.len(), record.iterations as usize);
+    assert!(record.rms_steps.iter().rev().skip(1).all(|r| *r >= 0.008));
+    let counted = Parameters { iterations: Some(record.iterations), tolerance: 0.0, ..parameters };
+    assert!(smoothed(&part, &counted).mesh == stopped.mesh);
 }
