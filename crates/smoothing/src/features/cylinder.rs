@@ -28,6 +28,19 @@ const FEWEST_FACES: usize = 12;
 /// patch, not the whole ring.
 const FIRST_TOLERANCE: f64 = 0.2;
 
+/// A patch is a candidate up to a misfit (root mean square) of the tolerance, and always up to this, in edge lengths. Patches of a noisy
+/// free surface have more; growing all of them was half of the time of detection at a million triangles.
+const LEAST_GATE: f64 = 0.04;
+
+/// The precision of a fit whose region is not the last one, in tolerances.
+const ROUGH: f64 = 1e-3;
+
+/// Most vertices that such a fit looks at, evenly chosen.
+const ROUGH_POINTS: usize = 2000;
+
+/// Most candidates that are grown at the same time.
+const MOST_AT_ONCE: usize = 8;
+
 /// Fewest places around the axis, apart from each other, at which an arc has vertices.
 const FEWEST_PLACES: usize = 5;
 
@@ -90,23 +103,51 @@ pub(super) fn cylinders(
     let mut found = Vec::new();
     // Faces of walls that were grown and refused; most candidates of one false wall are neighbours.
     let mut refused = vec![false; mesh.face_count()];
-    let mut inside = vec![false; mesh.face_count()];
-    for (k, candidate) in candidates.iter().enumerate() {
-        if k % 64 == 0 {
-            progress.check()?;
+    let mut next = 0;
+    // Most candidates of a noisy surface fail without a trace, and then the next can be grown at the same time. One that leaves a
+    // trace may change what comes after it, so it goes alone: what is found does not depend on the size of the batches.
+    let mut size = 1;
+    let mut insides = vec![vec![false; mesh.face_count()]; MOST_AT_ONCE];
+    while next < candidates.len() {
+        progress.check()?;
+        let is_open = |search: &Search<'_>, refused: &[bool], c: &Candidate| {
+            !search.taken[c.seed.index()] && !refused[c.seed.index()]
+        };
+        let mut batch = Vec::with_capacity(size);
+        while batch.len() < size && next < candidates.len() {
+            if is_open(&search, &refused, &candidates[next]) {
+                batch.push(&candidates[next]);
+            }
+            next += 1;
         }
-        if search.taken[candidate.seed.index()] || refused[candidate.seed.index()] {
-            continue;
+        let grow = |search: &Search<'_>, inside: &mut Vec<bool>, candidate: &Candidate| {
+            let (cylinder, faces) = search.grow(candidate, inside)?;
+            let closed = search.judge(&cylinder, &faces, candidate.edge);
+            Some((cylinder, faces, closed))
+        };
+        let outside = || vec![false; mesh.face_count()];
+        let walls: Vec<_> = batch
+            .par_iter()
+            .map_init(outside, |inside, candidate| grow(&search, inside, candidate))
+            .collect();
+        let (mut traces, mut walls_changed) = (false, false);
+        for (candidate, wall) in batch.into_iter().zip(walls) {
+            if !is_open(&search, &refused, candidate) {
+                continue;
+            }
+            let wall = if walls_changed { grow(&search, &mut insides[0], candidate) } else { wall };
+            let Some((cylinder, faces, closed)) = wall else { continue };
+            traces = true;
+            walls_changed |= closed.is_some();
+            let marks = if closed.is_some() { &mut search.taken } else { &mut refused };
+            for f in &faces {
+                marks[f.index()] = true;
+            }
+            if let Some(closed) = closed {
+                found.push(Wall { shape: shape(mesh, cylinder, &faces, candidate.hollow), faces, closed });
+            }
         }
-        let Some((cylinder, faces)) = search.grow(candidate, &mut inside) else { continue };
-        let closed = search.judge(&cylinder, &faces, candidate.edge);
-        let marks = if closed.is_some() { &mut search.taken } else { &mut refused };
-        for f in &faces {
-            marks[f.index()] = true;
-        }
-        if let Some(closed) = closed {
-            found.push(Wall { shape: shape(mesh, cylinder, &faces, candidate.hollow), faces, closed });
-        }
+        size = if traces { 1 } else { (2 * size).min(MOST_AT_ONCE) };
     }
     Ok(found)
 }
@@ -208,7 +249,7 @@ impl Search<'_> {
         let score = cylinder.misfit(&points) / edge;
         let outward: f64 =
             patch.iter().map(|&f| self.mesh.area_vector(f).dot(cylinder.radial(self.mesh.centroid(f)))).sum();
-        (score < FIRST_TOLERANCE && (outward < 0.0) == hollow).then_some(Candidate {
+        (score < self.tolerance.max(LEAST_GATE) && (outward < 0.0) == hollow).then_some(Candidate {
             score,
             seed,
             cylinder,
@@ -247,11 +288,20 @@ impl Search<'_> {
         let narrowest = self.tolerance * candidate.edge;
         let mut narrowed = false;
         for _ in 0..20 {
+            // Squares instead of roots: this is asked for more often than anything else.
+            let (least, most) =
+                ((cylinder.radius - limit).max(0.0).powi(2), (cylinder.radius + limit).powi(2));
             let fits = |f: FaceId| {
-                let radial = cylinder.radial(self.mesh.centroid(f)).normalize_or_zero();
                 !self.taken[f.index()]
-                    && side * self.normals[f.index()].dot(radial) > WALL_COSINE
-                    && self.mesh.corners(f).iter().all(|&p| cylinder.distance(p).abs() <= limit)
+                    && self.mesh.corners(f).iter().all(|&p| {
+                        let square = cylinder.radial(p).length_squared();
+                        least <= square && square <= most
+                    })
+                    && {
+                        let radial = cylinder.radial(self.mesh.centroid(f));
+                        let cosine = side * self.normals[f.index()].dot(radial);
+                        cosine > 0.0 && cosine * cosine > WALL_COSINE * WALL_COSINE * radial.length_squared()
+                    }
             };
             if !fits(candidate.seed) {
                 return None;
@@ -278,7 +328,15 @@ impl Search<'_> {
                 return None;
             }
             let points = points(self.mesh, &faces);
-            cylinder = cylinder.refine(&points, 20)?;
+            // While the tolerance narrows a small part of it will do: with noise the steps never get as short as rounding,
+            // and this was a third of the time of the whole stage at a million triangles.
+            cylinder = if narrowed {
+                cylinder.refine(&points, 20)?
+            } else {
+                let some: Vec<DVec3> =
+                    points.iter().step_by(points.len().div_ceil(ROUGH_POINTS)).copied().collect();
+                cylinder.refine_to(&some, 20, ROUGH * limit / cylinder.radius)?
+            };
             let settled = faces.len() == before;
             if narrowed && settled {
                 break;

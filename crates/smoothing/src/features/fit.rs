@@ -161,7 +161,12 @@ impl Cylinder {
     }
 
     /// Least squares of the distances of `points` by at most `rounds` steps of Gauss-Newton, from here.
-    pub(super) fn refine(mut self, points: &[DVec3], rounds: usize) -> Option<Self> {
+    pub(super) fn refine(self, points: &[DVec3], rounds: usize) -> Option<Self> {
+        self.refine_to(points, rounds, 1e-14)
+    }
+
+    /// As [`Self::refine`], until a step is smaller than `precision`, in radii.
+    pub(super) fn refine_to(mut self, points: &[DVec3], rounds: usize, precision: f64) -> Option<Self> {
         let n = points.len() as f64;
         let origin = points.iter().sum::<DVec3>() / n;
         for _ in 0..rounds {
@@ -179,14 +184,22 @@ impl Cylinder {
                 let e = radial / length;
                 // In units of the radius, so that the matrix has no unit.
                 let t = self.axis.dot(*p - self.point) / self.radius;
-                let row = [-e.dot(u), -e.dot(v), -t * e.dot(u), -t * e.dot(v), -1.0];
+                let (x, y) = (-e.dot(u), -e.dot(v));
+                let row = [x, y, t * x, t * y, -1.0];
                 let distance = (length - self.radius) / self.radius;
                 for i in 0..5 {
-                    for j in 0..5 {
-                        m[i][j] += row[i] * row[j] / n;
+                    for j in i..5 {
+                        m[i][j] += row[i] * row[j];
                     }
-                    b[i] -= row[i] * distance / n;
+                    b[i] -= row[i] * distance;
                 }
+            }
+            for i in 0..5 {
+                for j in i..5 {
+                    m[i][j] /= n;
+                    m[j][i] = m[i][j];
+                }
+                b[i] /= n;
             }
             let step = solve(m, b)?;
             self.point += (u * step[0] + v * step[1]) * self.radius;
@@ -195,7 +208,7 @@ impl Cylinder {
             if self.axis == DVec3::ZERO || !(self.radius > 0.0 && self.radius.is_finite()) {
                 return None;
             }
-            if step.iter().all(|s| s.abs() < 1e-14) {
+            if step.iter().all(|s| s.abs() < precision) {
                 break;
             }
         }
