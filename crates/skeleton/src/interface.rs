@@ -7,6 +7,15 @@ use crate::SkeletonError;
 use glam::DVec3;
 use topipe_mesh::{Connectivity, Design, FaceId, HalfEdgeId, Part, TriangleMesh, VertexId};
 
+/// Cosine of the angle up to which two interfaces lie in one plane: 15 degrees, for outlines run over rounded rims.
+const SAME_DIRECTION: f64 = 0.966;
+
+/// A strip between two interfaces is a cut when it is less than so many mean edge lengths wide.
+const STRIP: f64 = 4.0;
+
+/// The share of the nodes of an interface that lie along the strip: a quarter of a square.
+const BESIDE: f64 = 0.2;
+
 /// One closed border loop between a design set and a non-design set.
 #[derive(Debug, Clone)]
 pub(crate) struct Interface {
@@ -151,6 +160,34 @@ impl Sets {
             bordered[s] && volume[s] < 1e-3 * area[s].powf(1.5)
         };
         self.with_label(Design::Design).filter(hollow).collect()
+    }
+
+    /// Points between interfaces of one plane that a narrow strip of design faces parts: a label that cuts a face in two.
+    pub(crate) fn cut_faces(&self, mesh: &TriangleMesh) -> Vec<DVec3> {
+        let edge = mesh.mean_edge_length();
+        let mut found = Vec::new();
+        for (k, a) in self.interfaces.iter().enumerate() {
+            for b in &self.interfaces[k + 1..] {
+                let apart = a.non_design != b.non_design
+                    && self.of_face[a.half_edges[0].face().index()]
+                        == self.of_face[b.half_edges[0].face().index()];
+                let one_plane = a.normal.dot(b.normal) > SAME_DIRECTION
+                    && (b.centroid - a.centroid).dot(a.normal).abs() < STRIP * edge;
+                if !(apart && one_plane) {
+                    continue;
+                }
+                let near = |v: &&VertexId| {
+                    let p = mesh.position(**v);
+                    b.vertices.iter().any(|w| mesh.position(*w).distance(p) < STRIP * edge)
+                };
+                let beside: Vec<_> = a.vertices.iter().filter(near).collect();
+                if beside.len() as f64 >= BESIDE * a.vertices.len().min(b.vertices.len()) as f64 {
+                    found
+                        .push(beside.iter().map(|v| mesh.position(**v)).sum::<DVec3>() / beside.len() as f64);
+                }
+            }
+        }
+        found
     }
 
     /// The faces of `set`.

@@ -95,6 +95,13 @@ pub fn skeletonize(
             .remarks
             .insert(0, format!("{patches} design patches enclose no material and were taken for non-design"));
     }
+    for p in sets.cut_faces(&part.mesh) {
+        let [x, y, z] = p.to_array();
+        skeleton.remarks.push(format!(
+            "two interfaces lie in one plane at ({x:.3}, {y:.3}, {z:.3}), a strip of design faces between them: if a label cuts one \
+             face in two there, each piece gets a branch of its own; label the strip non-design to have one"
+        ));
+    }
     if parameters.method == Method::MarchingSections
         && !skeleton.sections.iter().any(|s| matches!(s, Section::Plane { .. }))
     {

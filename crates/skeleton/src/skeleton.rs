@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub enum PointKind {
     /// On the axis of a beam.
     Branch,
-    /// Where beams meet.
+    /// Where beams meet, or in a piece between them that has no section of its own.
     Junction,
     /// The centre of a border between design and non-design.
     Interface,

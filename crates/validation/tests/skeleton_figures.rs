@@ -179,13 +179,13 @@ fn the_frame_has_its_true_axes_and_nodes() {
     let rms = (sum / f64::from(count)).sqrt();
     assert!(count > 40 && rms <= 0.01, "{count} points, rms {rms} mm");
     let found = figures(&part, &skeleton);
-    // With the points next to the nodes, where the fillets of the mesh pull.
-    assert!(found.e_center.unwrap() <= 0.001, "{:?}", found.e_center);
+    // The true axes measure 0.0008 on this mesh.
+    assert!(found.e_center.unwrap() <= 0.0008, "{:?}", found.e_center);
     assert_eq!((found.cycles, found.out_of_object), (1, 0));
 }
 
 /// Points are compared after turning back: the clipping cube and the first ray of the measure itself are bound to the
-/// global axes.
+/// global axes. For the same points on the turned frame it gives 0.00074 to 0.00080.
 #[test]
 fn turning_and_scaling_move_points_and_nothing_else() {
     for (name, times) in [

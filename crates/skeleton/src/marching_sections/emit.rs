@@ -12,6 +12,7 @@ use crate::piece::Piece;
 use crate::skeleton::{PointKind, Section, Skeleton};
 use crate::torsion_constant;
 use glam::DVec3;
+use std::ops::Range;
 
 /// Rounds of the last centring: each turns the tangents of the neighbours, so one is not enough.
 const ROUNDS: usize = 4;
@@ -22,6 +23,12 @@ const FARTHEST: f64 = 4.0;
 
 /// No point nearer to a junction, interface or end than this many local radii.
 const CLEARANCE: f64 = 1.0;
+
+/// A section at the end of a branch that is this much larger than the median of the next ones belongs to the junction.
+const FILLET: f64 = 1.01;
+
+/// So many next ones.
+const FURTHER: usize = 8;
 
 /// Where a node stands: its position, and its point in the skeleton (none for the seam of a ring).
 #[derive(Debug, Clone, Copy)]
@@ -80,7 +87,11 @@ pub(super) fn emit(
         let points = centred(branch, &axes[b], [first, last], least, &mut cutter, parameters, inside);
         let ids: Vec<_> = points
             .into_iter()
-            .map(|(p, section)| skeleton.add_point(p, PointKind::Branch, section))
+            .map(|(p, section)| {
+                // What has no section of its own is no beam but a part of the junctions that it joins.
+                let kind = if section == Section::None { PointKind::Junction } else { PointKind::Branch };
+                skeleton.add_point(p, kind, section)
+            })
             .collect();
         let chain: Vec<u32> = first.point.into_iter().chain(ids.iter().copied()).chain(last.point).collect();
         chain.windows(2).for_each(|w| skeleton.add_edge(w[0], w[1]));
@@ -252,10 +263,23 @@ fn between(sections: &[Loop], ends: [Place; 2], least: usize) -> &[Loop] {
             >= CLEARANCE * (l.area / std::f64::consts::PI).sqrt()
     };
     let (mut from, mut to) = (0, sections.len());
-    while to - from > least.max(1) && !clear(from, from + 1, ends[0].at) {
+    // The first sections may still stand in the fillet of a junction, whose far side draws their centroids off the axis.
+    let settled = |k: usize, further: Range<usize>| {
+        let mut areas: Vec<f64> = sections[further].iter().map(|l| l.area).collect();
+        areas.sort_by(f64::total_cmp);
+        areas.get(areas.len() / 2).is_none_or(|median| sections[k].area <= FILLET * median)
+    };
+    let fewest = least.max(1).max(sections.len() / 2);
+    while to - from > least.max(1)
+        && (!clear(from, from + 1, ends[0].at)
+            || (to - from > fewest && !settled(from, from + 1..(from + 1 + FURTHER).min(to))))
+    {
         from += 1;
     }
-    while to - from > least.max(1) && !clear(to - 1, to - 2, ends[1].at) {
+    while to - from > least.max(1)
+        && (!clear(to - 1, to - 2, ends[1].at)
+            || (to - from > fewest && !settled(to - 1, (to - 1).saturating_sub(FURTHER).max(from)..to - 1)))
+    {
         to -= 1;
     }
     // What is left of a stub may be one section that is clear of neither end.
