@@ -7,7 +7,7 @@
 use std::error::Error;
 use std::sync::Arc;
 use std::time::Instant;
-use topipe_mesh::import::{ImportOptions, read};
+use topipe_mesh::import::{ImportOptions, Source, read_source};
 use topipe_progress::{Listener, Progress, Units};
 use topipe_spline_fit::{Parameters, Patch, fit};
 
@@ -35,7 +35,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let parameters = Parameters { spans, refinements, lambda, ..Default::default() };
     let silent = Progress::silent();
     let path = format!("fixtures/{name}/{name}.stl");
-    let part = read(&path, &std::fs::read(&path)?, &ImportOptions::default())?;
+    let bytes = std::fs::read(&path)?;
+    let labels_path = format!("fixtures/{name}/{name}.labels.csv");
+    let labels = std::fs::read(&labels_path).ok();
+    let source =
+        Source { labels: labels.as_ref().map(|l| (&*labels_path, &l[..])), ..Source::new(&path, &bytes) };
+    let part = read_source(&source, &ImportOptions::default(), &silent)?;
     let part = topipe_smoothing::smooth(&part, &Default::default(), &silent)?;
     let tile_parameters = topipe_tiling::Parameters { bend, ..Default::default() };
     let tiling = topipe_tiling::tile(&part, &tile_parameters, &silent)?;
@@ -62,10 +67,19 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (p, patch) in surface.patches.iter().enumerate() {
         patch.sides.iter().enumerate().for_each(|(k, s)| uses[s.edge as usize].push((p, k, s.reversed)));
     }
+    // A border without a feature is tangent to its plane or cylinder.
+    let mut shapes = vec![None; surface.edges.len()];
+    for face in &surface.faces {
+        face.loops.iter().flatten().for_each(|s| shapes[s.edge as usize] = Some(face.shape));
+    }
     let angles = layout.corner_angles();
     let mut jumps = Vec::new();
     for (e, uses) in uses.iter().enumerate() {
-        let (None, [a, b]) = (surface.edges[e].feature, &uses[..]) else { continue };
+        let (a, b) = match (surface.edges[e].feature, &uses[..], shapes[e]) {
+            (None, [a, b], _) => (a, Some(b)),
+            (None, [a], Some(_)) => (a, None),
+            _ => continue,
+        };
         let mut worst = (0.0f64, 0.0);
         for k in 0..=64 {
             let t = f64::from(k) / 64.0;
@@ -73,13 +87,16 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let (u, v) = Patch::side_parameters(side, if reversed { 1.0 - t } else { t });
                 surface.patches[p].evaluate(u, v).normal()
             };
-            let (n, m) = (normal(a), normal(b));
+            let on_shape = || {
+                shapes[e].map_or(topipe_mesh::DVec3::ZERO, |shape| shape.normal(surface.edges[e].position(t)))
+            };
+            let (n, m) = (normal(a), b.map_or_else(on_shape, normal));
             let angle = n.cross(m).length().atan2(n.dot(m)).to_degrees();
             if angle > worst.0 {
                 worst = (angle, t);
             }
         }
-        jumps.push((worst.0, worst.1, e, *a, *b));
+        jumps.push((worst.0, worst.1, e, *a, b.copied()));
     }
     jumps.sort_by(|a, b| b.0.total_cmp(&a.0));
     let above = |limit: f64| jumps.iter().filter(|j| j.0 > limit).count();
@@ -101,11 +118,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         place(1e-9, 0.125),
         place(0.125, 1.0)
     );
-    for &(jump, t, e, a, b) in jumps.iter().filter(|j| j.0 > 1.0).take(24) {
+    for &(jump, t, e, a, b) in jumps.iter().filter(|j| j.0 > 0.1).take(40) {
         let curve = &surface.edges[e];
         let chord = curve.control[0].distance(curve.control[curve.control.len() - 1]);
-        println!("  {jump:8.3} at {t:.2} of edge {e}, length {chord:.2}, {:?}", curve.position(t));
-        for (p, side, reversed) in [a, b] {
+        println!(
+            "  {jump:8.3} at {t:.2} of {} {e}, length {chord:.2}, {:?}",
+            if b.is_none() { "border" } else { "edge" },
+            curve.position(t)
+        );
+        for (p, side, reversed) in [Some(a), b].into_iter().flatten() {
             let line: Vec<String> = (0..=8)
                 .map(|k| {
                     let t = f64::from(k) / 8.0;
@@ -130,7 +151,69 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     folded(&layout, &surface);
+    far(&layout, &surface);
     Ok(())
+}
+
+/// Patches whose faces are far from them, and how they look.
+fn far(layout: &topipe_quad_matching::QuadLayout, surface: &topipe_spline_fit::SplineSurface) {
+    let mesh = &layout.part.mesh;
+    let mut faces = vec![Vec::new(); layout.quads.len()];
+    for (f, &q) in layout.quad_of_face.iter().enumerate() {
+        if (q as usize) < faces.len() {
+            faces[q as usize].push(topipe_mesh::FaceId::new(f));
+        }
+    }
+    let n = 64;
+    let mut list: Vec<(f64, usize, topipe_mesh::DVec3, (f64, f64))> = Vec::new();
+    for (p, patch) in surface.patches.iter().enumerate() {
+        let grid: Vec<((f64, f64), topipe_mesh::DVec3)> = (0..=n)
+            .flat_map(|i| (0..=n).map(move |j| (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n))))
+            .map(|(u, v)| ((u, v), patch.evaluate(u, v).position))
+            .collect();
+        let worst = faces[p]
+            .iter()
+            .map(|&f| {
+                let corners = mesh.triangles[f.index()].map(|v| mesh.position(v));
+                let at = (corners[0] + corners[1] + corners[2]) / 3.0;
+                let near = grid.iter().min_by(|a, b| a.1.distance(at).total_cmp(&b.1.distance(at))).unwrap();
+                (near.1.distance(at), p, at, near.0)
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        list.extend(worst);
+    }
+    list.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let diagonal = mesh.diagonal();
+    let above = |limit: f64| list.iter().filter(|l| l.0 > limit * diagonal).count();
+    println!(
+        "patches with faces farther than 1e-3 of the diagonal: {}, 2e-3: {}, 4e-3: {}",
+        above(1e-3),
+        above(2e-3),
+        above(4e-3)
+    );
+    for &(d, p, at, (u, v)) in list.iter().take(24) {
+        let area: topipe_mesh::DVec3 = faces[p].iter().map(|&f| mesh.area_vector(f)).sum();
+        let mean = area.normalize_or_zero();
+        let cone = faces[p]
+            .iter()
+            .map(|&f| mesh.normal(f).dot(mean).clamp(-1.0, 1.0).acos().to_degrees())
+            .fold(0.0, f64::max);
+        let sides = surface.patches[p].sides.map(|s| {
+            let edge = &surface.edges[s.edge as usize];
+            let c = &edge.control;
+            let kind = edge.feature.map_or("", |_| "f");
+            format!("{:.1}{kind}", c[0].distance(c[c.len() - 1]))
+        });
+        let angles = layout.corner_angles()[p].map(|a| a.to_degrees().round());
+        println!(
+            "  {:.2e} patch {p} at ({u:.2} {v:.2}) {:?}: {} faces, cone {cone:.0}, sides {sides:?}, corners {angles:?}, knots {} x {}",
+            d / diagonal,
+            at.round(),
+            faces[p].len(),
+            surface.patches[p].basis_u.len() / 2 - 1,
+            surface.patches[p].basis_v.len() / 2 - 1
+        );
+    }
 }
 
 /// Patches whose normal turns against their mean somewhere, by what is odd about them.

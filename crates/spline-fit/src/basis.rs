@@ -50,9 +50,14 @@ impl Basis {
     /// The cubic basis with `spans` equal spans (at least one) and double interior knots: curves in it have a
     /// continuous first derivative, and each span can have any point and slope at its ends.
     pub fn double(spans: usize) -> Self {
-        let spans = spans.max(1);
+        let inner: Vec<f64> = (1..spans).map(|k| k as f64 / spans as f64).collect();
+        Self::with_double_knots(&inner)
+    }
+
+    /// The same with the given interior knots, ascending inside (0, 1).
+    pub(crate) fn with_double_knots(inner: &[f64]) -> Self {
         let mut knots = vec![0.0; 4];
-        knots.extend((1..spans).flat_map(|k| [k as f64 / spans as f64; 2]));
+        knots.extend(inner.iter().flat_map(|&t| [t; 2]));
         knots.extend([1.0; 4]);
         Self { degree: 3, knots }
     }

@@ -6,7 +6,8 @@
 //! fades into the free surface begins there. Asking for one tangent plane would twist the patches beside it, often
 //! until they fold. The edge along which the mesh folds there becomes a crease itself: at its other end, where no
 //! other crease is, the patches beside it have one tangent plane again. In the same way a border is no longer tangent
-//! to its shape where the mesh is not at one of its ends.
+//! to its shape where the mesh is not at one of its ends, or where the border on the other side of the patches leaves
+//! the shape's tangent plane.
 
 use crate::fans::{EdgeRole, Sector, Spoke};
 use crate::frames::{CORNER, Given};
@@ -18,6 +19,10 @@ use topipe_mesh::DVec3;
 /// degrees. Of the tangent planes that two borders fix in the nine example parts half are within 6 degrees of the
 /// mesh's, the others between 25 and 90.
 const FAR: f64 = 0.906;
+
+/// A border that leaves a shape's tangent plane by more than this angle (the sine of 0.03 degrees) does not lie in it:
+/// no patch between the border and the shape is tangent to the shape at its corner.
+const LEAVES: f64 = 5e-4;
 
 /// What is not smooth after all.
 #[derive(Debug, Default, PartialEq)]
@@ -63,15 +68,19 @@ fn corner(
     };
     let own = normal(&sector.quads, &sector.spokes);
     let ends = [sector.spokes[0], sector.spokes[sector.spokes.len() - 1]];
-    let sharp: Vec<usize> = ends
-        .iter()
-        .map(|s| s.edge as usize)
-        .filter(|&e| {
-            let shape = given.tangent_to[e].as_ref();
-            shape.is_some_and(|shape| shape.normal(at).dot(own) < FAR)
+    let directions = ends.map(|s| given.fixed_direction(s, tangents));
+    let sharp: Vec<usize> = [0, 1]
+        .into_iter()
+        .filter(|&k| {
+            let shape = given.tangent_to[ends[k].edge as usize].as_ref();
+            shape.is_some_and(|shape| {
+                let normal = shape.normal(at);
+                normal.dot(own) < FAR || directions[1 - k].is_some_and(|d| d.dot(normal).abs() > LEAVES)
+            })
         })
+        .map(|k| ends[k].edge as usize)
         .collect();
-    let [a, b] = [given.fixed_direction(ends[0], tangents)?, given.fixed_direction(ends[1], tangents)?];
+    let [a, b] = [directions[0]?, directions[1]?];
     let across = a.cross(b);
     let twisted = across.length() > CORNER && (across.normalize().dot(own).abs() < FAR);
     if !twisted || sector.quads.len() < 2 {

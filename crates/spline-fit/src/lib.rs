@@ -14,14 +14,16 @@
 //! bit where their knots are the same, else with knots inserted), so the surface is watertight; the result does not depend
 //! on the number of threads.
 //!
-//! Not guaranteed: a bound on the normal jump or on the deviation. Knots are inserted while they help, up to
-//! `refinements` times; what remains is measured by validation. Patches of quads with corners near 180 degrees, or finer
-//! than the mesh, may fold.
+//! Not guaranteed: a bound on the normal jump or on the deviation. Along edges knots are inserted until the normals agree
+//! to `max_normal_jump` or spans are very short, curves are refined up to `refinements` times where the distance is large;
+//! what remains is said in a remark and measured by validation. Patches of quads with corners near 180 degrees, or finer
+//! than the mesh, may fold inside.
 
 mod adapt;
 mod analytic_face;
 pub mod basis;
 mod borders;
+mod breaks;
 mod cholesky;
 pub mod control_nets;
 mod corners;
@@ -34,6 +36,7 @@ mod fit;
 mod foot_points;
 mod frames;
 mod hermite;
+mod knot_insertion;
 mod local_surface;
 mod network;
 mod parameters;

@@ -24,15 +24,14 @@ pub struct Parameters {
     /// Spans along an edge to begin with, a power of two, 1 to 16 (continuity "tangent"). Below four the normals do not
     /// agree at all corners.
     pub spans: u32,
-    /// Times the spans may be doubled where the surface is not within `tolerance` (curves too, up to 8) or
-    /// `max_normal_jump` (the patches' knots only, up to 16).
+    /// Times the spans may be doubled, up to 8, where the surface is not within `tolerance`.
     pub refinements: u32,
     /// Largest distance of the mesh from the surface that is not refined, over the diagonal of the part.
     pub tolerance: f64,
     /// The same in mm; the narrower of both counts.
     pub tolerance_mm: Option<f64>,
     /// Largest angle between the normals of two patches along an edge that is no feature, degrees; knots are inserted
-    /// where it is exceeded.
+    /// where it is exceeded, down to spans of 1/256 of an edge.
     pub max_normal_jump: f64,
     /// Polynomial degree in both directions, 2 to 7.
     pub degree: u32,
@@ -54,8 +53,7 @@ pub struct Parameters {
 /// | 1e-4 | 31; 1.7e-4 | 37; 1.2e-4 |
 const DEFAULT_LAMBDA: f64 = 1.0 - 1e-5;
 
-/// Spans and how often they are doubled. Smooth edges above 0.1 degrees of all, largest jump, and seconds for the fit (two
-/// cores shared with other work; tiles of one size, without labels: `--example continuity -- CASE SPANS REFINEMENTS 0`):
+/// Spans and how often they are doubled: DOUBLINGS
 ///
 /// | spans, refinements | y-form (1,070 edges) | support (1,495) | bridge (2,417) |
 /// |---|---|---|---|

@@ -23,6 +23,7 @@ pub(crate) struct Border {
 }
 
 /// Control net of a patch: u fastest.
+#[derive(Debug, Clone)]
 pub(crate) struct Net {
     pub(crate) basis_u: Basis,
     pub(crate) basis_v: Basis,

@@ -1,5 +1,6 @@
 //! The patches of the fit with tangents, each for itself.
 
+use crate::breaks::Breaks;
 use crate::energy::Gram;
 use crate::hermite;
 use crate::network::{Curve, Network};
@@ -29,6 +30,13 @@ pub(crate) struct Patches<'a> {
     pub(crate) parameters: &'a Parameters,
     pub(crate) units: &'a Units,
     pub(crate) progress: &'a Progress,
+}
+
+impl Fitted {
+    /// Spans of the fit along a side.
+    pub(crate) fn spans(&self, side: usize) -> usize {
+        self.borders[side].spans
+    }
 }
 
 impl Patches<'_> {
@@ -159,34 +167,39 @@ fn rounds(
     Some(net)
 }
 
+/// A side of a patch with `breaks` along it, in the direction of the patch.
+pub(crate) fn side_of<'a>(
+    setting: &'a Setting<'_>,
+    quad: usize,
+    k: usize,
+    curves: &'a [Curve],
+    breaks: &'a Breaks,
+) -> Side<'a> {
+    let side = setting.layout.quads[quad][k];
+    let e = side.edge as usize;
+    let normals = match (&curves[e].normals, &setting.tangent_to[e]) {
+        (Some(normals), _) => Some(Normals::Prescribed(normals)),
+        (None, Some(shape)) => Some(Normals::Of(shape)),
+        _ => None,
+    };
+    Side { control: &curves[e].control, reversed: side.reversed, normals, breaks }
+}
+
 /// The borders of a patch, with their ribbons.
 fn borders_of(setting: &Setting<'_>, quad: usize, curves: &[Curve], spans: &[usize]) -> [Border; 4] {
-    let quad = setting.layout.quads[quad];
     let own = |k: usize| {
-        let e = quad[k].edge as usize;
+        let e = setting.layout.quads[quad][k].edge as usize;
         side_spans(&curves[e], spans[e])
     };
-    let sides = [0, 1, 2, 3].map(|k| {
-        let e = quad[k].edge as usize;
-        let curve = &curves[e];
-        let normals = match (&curve.normals, &setting.tangent_to[e]) {
-            (Some(normals), _) => Some(Normals::Prescribed(normals)),
-            (None, Some(shape)) => Some(Normals::Of(shape)),
-            _ => None,
-        };
-        Side {
-            control: &curve.control,
-            reversed: quad[k].reversed,
-            normals,
-            spans: own(k).max(own((k + 2) % 4)),
-        }
-    });
+    let spans = [0, 1, 2, 3].map(|k| own(k).max(own((k + 2) % 4)));
+    let breaks = spans.map(Breaks::uniform);
+    let sides = [0, 1, 2, 3].map(|k| side_of(setting, quad, k, curves, &breaks[k]));
     let mut ribbons = ribbons(&sides);
     [0, 1, 2, 3].map(|k| {
         let mut control = sides[k].control.to_vec();
         if sides[k].reversed {
             control.reverse();
         }
-        Border { control, spans: sides[k].spans, ribbon: ribbons[k].take() }
+        Border { control, spans: spans[k], ribbon: ribbons[k].take() }
     })
 }

@@ -17,6 +17,7 @@
 //! and y, the mean is taken. Then x and y are the cubics on the whole side that have these derivatives at its ends. (To
 //! give only the first span the mean makes E.N of the second order there.)
 
+use crate::breaks::Breaks;
 use crate::hermite;
 use glam::DVec2;
 use topipe_mesh::{DVec3, RegionShape};
@@ -37,8 +38,8 @@ pub(crate) struct Side<'a> {
     /// The patch runs along the curve backwards.
     pub(crate) reversed: bool,
     pub(crate) normals: Option<Normals<'a>>,
-    /// Spans of the patch along this side, at least those of the curve.
-    pub(crate) spans: usize,
+    /// Breaks of the patch along this side in its direction, at least those of the curve.
+    pub(crate) breaks: &'a Breaks,
 }
 
 /// The moving frame at one break of a side, in the patch's direction.
@@ -83,9 +84,9 @@ impl Side<'_> {
     /// The frames at the breaks. `None` without normals, or where the curve stands still.
     fn stations(&self) -> Option<Vec<Station>> {
         let normals = self.normals?;
-        (0..=self.spans)
-            .map(|k| {
-                let t = k as f64 / self.spans as f64;
+        let breaks = self.breaks.as_slice().iter();
+        breaks
+            .map(|&t| {
                 let t = if self.reversed { 1.0 - t } else { t };
                 let [point, first, second] = self.curve(t);
                 let (raw, slope) = match normals {
@@ -166,7 +167,7 @@ impl Station {
 }
 
 /// For each side that has normals, what leads from the control points of the side to those beside it (the derivative
-/// across over three times the spans across), over the basis of the patch along the side and in its direction.
+/// across times a third of the first span across), over the basis of the patch along the side and in its direction.
 /// Sides in order around the patch, counter-clockwise.
 pub(crate) fn ribbons(sides: &[Side<'_>; 4]) -> [Option<Vec<DVec3>>; 4] {
     let stations = [0, 1, 2, 3].map(|k| sides[k].stations());
@@ -198,7 +199,7 @@ pub(crate) fn ribbons(sides: &[Side<'_>; 4]) -> [Option<Vec<DVec3>>; 4] {
         }
         let (mut values, mut slopes) = (Vec::with_capacity(n + 1), Vec::with_capacity(n + 1));
         for (i, station) in stations.iter().enumerate() {
-            let (components, change) = field.at(i as f64 / n as f64);
+            let (components, change) = field.at(sides[k].breaks.as_slice()[i]);
             // At the ends the leg itself, also where it leaves the tangent plane a little.
             let end = if i == 0 { Some(0) } else { (i == n).then_some(1) };
             let value = match end {
@@ -209,8 +210,8 @@ pub(crate) fn ribbons(sides: &[Side<'_>; 4]) -> [Option<Vec<DVec3>>; 4] {
             slopes.push(slope.unwrap_or_else(|| station.slope(value, components, change)));
             values.push(value);
         }
-        let scale = 1.0 / (3.0 * sides[(k + 1) % 4].spans as f64);
-        ribbons[k] = Some(hermite::control(&values, &slopes).into_iter().map(|p| scale * p).collect());
+        let scale = sides[(k + 1) % 4].breaks.first_width() / 3.0;
+        ribbons[k] = Some(sides[k].breaks.control(&values, &slopes).into_iter().map(|p| scale * p).collect());
     }
     ribbons
 }
@@ -246,12 +247,12 @@ mod tests {
     }
 
     fn largest(form: [f64; 3], spans: usize) -> f64 {
-        let curves = patch(form, spans);
+        let (curves, breaks) = (patch(form, spans), Breaks::uniform(spans));
         let sides = [0, 1, 2, 3].map(|k| Side {
             control: &curves[k].0,
             reversed: false,
             normals: Some(Normals::Prescribed(&curves[k].1)),
-            spans,
+            breaks: &breaks,
         });
         let ribbons = ribbons(&sides);
         let mut largest = 0.0f64;
@@ -284,12 +285,12 @@ mod tests {
 
     #[test]
     fn both_sides_of_a_corner_agree_on_the_control_point_inside() {
-        let curves = patch([0.5, 0.2, -0.3], 4);
+        let (curves, breaks) = (patch([0.5, 0.2, -0.3], 4), Breaks::uniform(4));
         let sides = [0, 1, 2, 3].map(|k| Side {
             control: &curves[k].0,
             reversed: false,
             normals: Some(Normals::Prescribed(&curves[k].1)),
-            spans: 4,
+            breaks: &breaks,
         });
         let ribbons = ribbons(&sides).map(Option::unwrap);
         for k in 0..4 {
@@ -303,12 +304,12 @@ mod tests {
 
     #[test]
     fn no_ribbon_without_normals() {
-        let curves = patch([0.0; 3], 2);
+        let (curves, breaks) = (patch([0.0; 3], 2), Breaks::uniform(2));
         let sides = [0, 1, 2, 3].map(|k| Side {
             control: &curves[k].0,
             reversed: false,
             normals: (k != 1).then_some(Normals::Prescribed(&curves[k].1)),
-            spans: 2,
+            breaks: &breaks,
         });
         assert_eq!(ribbons(&sides).map(|r| r.is_some()), [true, false, true, true]);
     }

@@ -3,12 +3,13 @@
 //! Source, section 2.3, after Mosbach et al. 2022: vertices, edges and faces are found one after the other from local
 //! problems, each once, so that what patches share is one number. Beyond the source, patches are tangent continuous:
 //! vertices and edges carry normals from the mesh, and patches take their derivatives across from these normals along their sides.
-//! Tangency needs double knots (a bicubic patch with simple ones has too few degrees of freedom) and knots inserted
-//! where the normals turn fast, which is decided edge by edge.
+//! Tangency needs double knots (a bicubic patch with simple ones has too few degrees of freedom), and knots inserted
+//! where the normals turn fast, which is decided span by span (see [`crate::knot_insertion`]).
 //!
 //! Borders of region faces are given: their curves lie on the shapes, and where the mesh meets a shape smoothly the
 //! patch takes its normals along the border from the shape.
 use crate::hermite;
+use crate::knot_insertion::insert_knots;
 use crate::network::{Network, network};
 use crate::patch_fit::Net;
 use crate::patches::{Fitted, Patches};
@@ -45,9 +46,10 @@ pub(crate) fn fit(
             }
         }
         let network = network(&setting, &samples, refinement.spans())?;
-        let fitted = patches.fit(&mut samples, &network, refinement.patch_spans(), before)?;
-        let mut surface = assemble(&setting, &network, &fitted);
-        if !refinement.next(&setting, &surface, &samples, progress) {
+        let fitted = patches.fit(&mut samples, &network, refinement.spans(), before)?;
+        if !refinement.next(&setting, &fitted, &samples, progress) {
+            let nets = insert_knots(&setting, &network.curves, &fitted, parameters.max_normal_jump, progress);
+            let mut surface = assemble(&setting, network, nets);
             simplify(&mut surface, setting.borders.tolerance);
             return Ok(surface);
         }
@@ -67,11 +69,11 @@ pub(crate) fn first_patches(
     let refinement = Refinement::new(&setting, parameters);
     let network = network(&setting, samples, refinement.spans())?;
     let patches = Patches { setting: &setting, parameters, units: &Units::none(), progress: &progress };
-    let (borders, corners) = patches.given(&network, refinement.patch_spans());
+    let (borders, corners) = patches.given(&network, refinement.spans());
     Ok(patches.keys(samples, &borders, &corners))
 }
 
-fn assemble(setting: &Setting<'_>, network: &Network, fitted: &[Fitted]) -> SplineSurface {
+fn assemble(setting: &Setting<'_>, network: Network, nets: Vec<Net>) -> SplineSurface {
     let layout = setting.layout;
     let edge = |e: usize| match &setting.borders.curves[e] {
         Some(curve) => curve.clone(),
@@ -83,19 +85,20 @@ fn assemble(setting: &Setting<'_>, network: &Network, fitted: &[Fitted]) -> Spli
             shape: CurveShape::Spline,
         },
     };
+    let edges = (0..layout.edges.len()).map(edge).collect();
     SplineSurface {
-        vertices: network.frames.positions.clone(),
-        edges: (0..layout.edges.len()).map(edge).collect(),
-        patches: fitted.iter().enumerate().map(|(quad, f)| patch(layout, quad, &f.net)).collect(),
+        vertices: network.frames.positions,
+        edges,
+        patches: nets.into_iter().enumerate().map(|(quad, net)| patch(layout, quad, net)).collect(),
         faces: setting.borders.faces.clone(),
     }
 }
 
-fn patch(layout: &QuadLayout, quad: usize, net: &Net) -> Patch {
+fn patch(layout: &QuadLayout, quad: usize, net: Net) -> Patch {
     Patch {
         sides: layout.quads[quad].map(|s| PatchSide { edge: s.edge, reversed: s.reversed }),
-        basis_u: net.basis_u.clone(),
-        basis_v: net.basis_v.clone(),
-        control: net.control.clone(),
+        basis_u: net.basis_u,
+        basis_v: net.basis_v,
+        control: net.control,
     }
 }

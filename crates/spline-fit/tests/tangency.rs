@@ -32,6 +32,38 @@ fn patches_on_a_sphere_meet_with_a_common_tangent_plane() {
     }
 }
 
+/// However narrow the limit: knots are inserted until the normals agree to it, and the surface stays where it is.
+#[test]
+fn knots_are_inserted_until_the_normals_agree() {
+    let layout = layout(&sphere(4), 1.5);
+    let with = |max_normal_jump: f64| {
+        let parameters = Parameters { refinements: 0, max_normal_jump, ..Default::default() };
+        fit(&layout, &parameters, &Units::none(), &Progress::silent()).unwrap()
+    };
+    let (free, limited) = (with(180.0), with(2e-3));
+    let points = |surface: &SplineSurface| surface.patches.iter().map(|p| p.control.len()).sum::<usize>();
+    assert!(largest_jump(&free) > 1e-2, "{} degrees: nothing to do", largest_jump(&free));
+    assert!(largest_jump(&limited) < 2e-3, "{} degrees", largest_jump(&limited));
+    assert!(points(&limited) > points(&free));
+    // Edges are the same curves, and between them the surfaces differ by little.
+    assert_eq!(free.edges, limited.edges);
+    for (a, b) in free.patches.iter().zip(&limited.patches) {
+        for (u, v) in [(0.0, 0.3), (0.1, 0.1), (0.5, 0.5), (0.9, 0.2), (1.0, 0.7)] {
+            let apart = a.evaluate(u, v).position.distance(b.evaluate(u, v).position);
+            assert!(apart < 1e-4, "{apart} at ({u}, {v})");
+        }
+    }
+}
+
+/// A topology optimization result, smoothed: narrow struts, noise, borders of planes and holes.
+#[test]
+fn patches_of_a_real_part_meet_with_a_common_tangent_plane() {
+    let layout = common::fixture("beam-two-holes");
+    let surface = fit(&layout, &Parameters::default(), &Units::none(), &Progress::silent()).unwrap();
+    assert!(surface.patches.len() > 300 && surface.faces.len() > 4);
+    assert!(largest_jump(&surface) < 0.1, "{} degrees", largest_jump(&surface));
+}
+
 #[test]
 fn patches_on_a_torus_meet_with_a_common_tangent_plane() {
     // A mesh with eleven degrees from facet to facet: the normals are those of a smooth surface all the same.

@@ -222,7 +222,7 @@ pub struct LayoutFigures {
 /// Angles between the normals of two patches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NormalJump {
-    /// Largest.
+    /// Largest, also at the ends of edges and between any two knots of the patches.
     pub max: f64,
     /// 99 % are smaller.
     pub p99: f64,

@@ -1,6 +1,7 @@
 //! Surfaces that are known, and what is measured on fits to them.
 #![allow(dead_code)] // each test binary uses its share
 
+use topipe_mesh::import::{ImportOptions, Source, read_source};
 use topipe_mesh::{DVec3, Part, TriangleMesh};
 use topipe_progress::Progress;
 use topipe_quad_matching::{QuadLayout, match_quads};
@@ -18,6 +19,19 @@ pub(crate) fn layout(part: &Part, tile_size: f64) -> QuadLayout {
         ..Default::default()
     };
     match_quads(&tiling, &parameters, &Progress::silent()).unwrap()
+}
+
+/// The layout of a part in `fixtures/`, with its labels, as a pipeline with default parameters has it.
+pub(crate) fn fixture(name: &str) -> QuadLayout {
+    let place = format!("{}/../../fixtures/{name}/{name}", env!("CARGO_MANIFEST_DIR"));
+    let silent = Progress::silent();
+    let [bytes, labels] =
+        [".stl", ".labels.csv"].map(|ending| std::fs::read(place.clone() + ending).unwrap());
+    let source = Source { labels: Some(("labels.csv", &labels)), ..Source::new("part.stl", &bytes) };
+    let part = read_source(&source, &ImportOptions::default(), &silent).unwrap();
+    let part = topipe_smoothing::smooth(&part, &Default::default(), &silent).unwrap();
+    let tiling = topipe_tiling::tile(&part, &Default::default(), &silent).unwrap();
+    match_quads(&tiling, &Default::default(), &silent).unwrap()
 }
 
 /// An octahedron divided `depth` times and pushed onto the unit sphere.

@@ -17,7 +17,10 @@ enum Use {
 /// What one edge has to say.
 #[derive(Default)]
 struct EdgeResult {
+    /// At even distances.
     jumps: Vec<(f64, DVec3)>,
+    /// The largest between any two knots of the patches: what even distances can miss where knots are close.
+    between_knots: Option<(f64, DVec3)>,
     singular: usize,
     gap: f64,
 }
@@ -28,6 +31,9 @@ pub(super) fn angle(a: DVec3, b: DVec3) -> f64 {
 }
 
 /// Normal jumps over edges of patches that are not features, and the largest gap over all edges.
+///
+/// Mean and percentile are of `points` at even distances along each edge; the largest counts the ends of the edge and four
+/// points between any two knots too.
 ///
 /// The angle between two faces of known shape is given with the shapes: it is not counted as a jump.
 pub(super) fn along_edges(surface: &SplineSurface, points: u32) -> (Option<NormalJump>, f64) {
@@ -57,7 +63,10 @@ pub(super) fn along_edges(surface: &SplineSurface, points: u32) -> (Option<Norma
     let mut jumps: Vec<(f64, DVec3)> = results.iter().flat_map(|r| r.jumps.iter().copied()).collect();
     // Stable: of equal jumps the first edge comes first.
     jumps.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let jump = jumps.last().map(|&(max, at)| NormalJump {
+    let between = results.iter().filter_map(|r| r.between_knots);
+    let largest =
+        jumps.last().copied().into_iter().chain(between).reduce(|a, b| if b.0 > a.0 { b } else { a });
+    let jump = largest.map(|(max, at)| NormalJump {
         max,
         p99: jumps[((jumps.len() - 1) as f64 * 0.99) as usize].0,
         mean: jumps.iter().map(|j| j.0).sum::<f64>() / jumps.len() as f64,
@@ -87,8 +96,14 @@ fn at(surface: &SplineSurface, edge: &EdgeCurve, u: Use, t: f64) -> (DVec3, DVec
 fn compare(surface: &SplineSurface, edge: &EdgeCurve, a: Use, b: Use, points: u32) -> EdgeResult {
     let mut result = EdgeResult::default();
     let shared = [a, b].iter().all(|u| shares_controls(surface, edge, *u));
-    for k in 0..points {
-        let t = (f64::from(k) + 0.5) / f64::from(points);
+    let even = (0..points).map(|k| (f64::from(k) + 0.5) / f64::from(points));
+    let between: Vec<f64> = knots(surface, &[a, b])
+        .windows(2)
+        .flat_map(|w| [0.0, 0.25, 0.5, 0.75].map(|x| w[0] + x * (w[1] - w[0])))
+        .chain([1.0])
+        .collect();
+    let places = even.map(|t| (t, true)).chain(between.into_iter().map(|t| (t, false)));
+    for (t, even) in places {
         let ((p, n), (q, m)) = (at(surface, edge, a, t), at(surface, edge, b, t));
         let gap = match (a, b) {
             (Use::Patch { .. }, Use::Patch { .. }) if shared => 0.0,
@@ -102,13 +117,34 @@ fn compare(surface: &SplineSurface, edge: &EdgeCurve, a: Use, b: Use, points: u3
         let between_shapes = matches!((a, b), (Use::Shape(_), Use::Shape(_)));
         if edge.feature.is_none() && !between_shapes {
             if n == DVec3::ZERO || m == DVec3::ZERO {
-                result.singular += 1;
+                result.singular += usize::from(even);
             } else {
-                result.jumps.push((angle(n, m).to_degrees(), p));
+                let jump = (angle(n, m).to_degrees(), p);
+                if even {
+                    result.jumps.push(jump);
+                } else if result.between_knots.is_none_or(|most| jump.0 > most.0) {
+                    result.between_knots = Some(jump);
+                }
             }
         }
     }
     result
+}
+
+/// Ends of the polynomial pieces of both faces along an edge, in its direction.
+fn knots(surface: &SplineSurface, uses: &[Use]) -> Vec<f64> {
+    let mut knots = vec![0.0, 1.0];
+    for u in uses {
+        let Use::Patch { patch, side, reversed } = *u else { continue };
+        let patch = &surface.patches[patch as usize];
+        let basis = if side % 2 == 0 { &patch.basis_u } else { &patch.basis_v };
+        // Sides 2 and 3 run against u and v.
+        let against = reversed != (side >= 2);
+        knots.extend(basis.breaks().into_iter().map(|t| if against { 1.0 - t } else { t }));
+    }
+    knots.sort_unstable_by(f64::total_cmp);
+    knots.dedup();
+    knots
 }
 
 /// Whether the border row of the patch and its knots are those of the curve, bit for bit: then both sides are the

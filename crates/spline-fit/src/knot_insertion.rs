@@ -1,0 +1,184 @@
+//! Knots along the sides of patches, where these do not follow the normals closely enough.
+//!
+//! A patch meets the normals along its side exactly at the breaks of its knots; between them the angle to them falls
+//! with the fourth power of the length of a span, near corners whose mixed derivatives do not agree with the square.
+//! Either way it falls, and where it matters only along a small part of an edge. So spans are divided where the angle
+//! is above its limit, on both sides of the edge, until it is nowhere, or spans have become too short to matter.
+//!
+//! The inside of a patch has nothing to gain from such knots: it is fitted once, to few of them, they are inserted into
+//! it, and only the two rows of control points at the side are set anew.
+
+use crate::breaks::Breaks;
+use crate::fans::EdgeRole;
+use crate::network::Curve;
+use crate::patch_fit::{Net, side_rows};
+use crate::patches::{Fitted, side_of};
+use crate::ribbon::ribbons;
+use crate::setting::Setting;
+use crate::{Patch, SurfacePoint};
+use rayon::prelude::*;
+use topipe_mesh::{DVec3, RegionShape};
+use topipe_progress::Progress;
+use topipe_quad_matching::QuadLayout;
+
+/// Shortest span that is divided, as a share of its edge.
+const SHORTEST: f64 = 1.0 / 256.0;
+/// Where in each span normals are compared, as shares of it: both kinds of error are near their largest at one of these.
+const PLACES: [f64; 5] = [0.08, 0.3, 0.5, 0.7, 0.92];
+/// Share of the limit from which on a span is divided: between the places the angle may be a little larger.
+const MARGIN: f64 = 0.8;
+/// Above this multiple of the limit a span is quartered at once.
+const QUARTER: f64 = 16.0;
+
+/// Inserts knots until no angle along an edge that is no feature is above `limit` degrees, as far as that is possible.
+pub(crate) fn insert_knots(
+    setting: &Setting<'_>,
+    curves: &[Curve],
+    fitted: &[Fitted],
+    limit: f64,
+    progress: &Progress,
+) -> Vec<Net> {
+    let layout = setting.layout;
+    let spans = |e: usize| {
+        let beside = setting.beside[e].iter().map(|&(q, side)| fitted[q as usize].spans(side as usize));
+        Breaks::uniform(beside.min().unwrap_or(1))
+    };
+    let mut breaks: Vec<Breaks> = (0..layout.edges.len()).map(spans).collect();
+    let mut nets: Vec<Net> = fitted.iter().map(|f| f.net.clone()).collect();
+    let mut dirty: Vec<bool> = vec![true; layout.edges.len()];
+    let (mut inserted, mut largest) = (0, 0.0f64);
+    let mut angles = vec![0.0f64; layout.edges.len()];
+    loop {
+        let divisions: Vec<Option<(Vec<usize>, f64)>> = (0..layout.edges.len())
+            .into_par_iter()
+            .map(|e| dirty[e].then(|| divide(setting, &nets, &breaks[e], e, limit)))
+            .collect();
+        let mut changed = vec![false; nets.len()];
+        dirty.fill(false);
+        for (e, division) in divisions.into_iter().enumerate() {
+            let Some((pieces, angle)) = division else { continue };
+            angles[e] = angle;
+            let more = pieces.iter().sum::<usize>() - pieces.len();
+            if more > 0 {
+                inserted += more;
+                breaks[e] = breaks[e].divided(|k| pieces[k]);
+                setting.beside[e].iter().for_each(|&(q, _)| changed[q as usize] = true);
+            }
+        }
+        if !changed.contains(&true) {
+            largest = angles.iter().fold(largest, |a, &b| a.max(b));
+            break;
+        }
+        nets.par_iter_mut().enumerate().filter(|(q, _)| changed[*q]).for_each(|(q, net)| {
+            *net = with_knots(setting, curves, &fitted[q], q, &breaks);
+        });
+        for (q, _) in changed.iter().enumerate().filter(|(_, changed)| **changed) {
+            layout.quads[q].iter().for_each(|side| dirty[side.edge as usize] = true);
+        }
+    }
+    progress.remark(&format!(
+        "normals: {inserted} knots inserted along edges; {} edges above {limit} degrees, the largest {largest:.3}",
+        angles.iter().filter(|&&a| a > limit).count()
+    ));
+    nets
+}
+
+/// The fitted patch with knots at the breaks of its edges.
+fn with_knots(
+    setting: &Setting<'_>,
+    curves: &[Curve],
+    fitted: &Fitted,
+    quad: usize,
+    breaks: &[Breaks],
+) -> Net {
+    let sides = setting.layout.quads[quad];
+    // In the direction of the patch along side k.
+    let along = |k: usize| {
+        let own = &breaks[sides[k].edge as usize];
+        if sides[k].reversed { own.reversed() } else { own.clone() }
+    };
+    let fitted_u = Breaks::uniform(fitted.spans(0));
+    let fitted_v = Breaks::uniform(fitted.spans(1));
+    let u = fitted_u.union(&along(0)).union(&along(2).reversed());
+    let v = fitted_v.union(&along(1)).union(&along(3).reversed());
+    let around = [u.clone(), v.clone(), u.reversed(), v.reversed()];
+    let given = [0, 1, 2, 3].map(|k| side_of(setting, quad, k, curves, &around[k]));
+    let ribbons = ribbons(&given);
+
+    let width = fitted.net.basis_u.len();
+    let rows: Vec<Vec<DVec3>> =
+        fitted.net.control.chunks_exact(width).map(|row| fitted_u.refine(row, &u)).collect();
+    let (basis_u, basis_v) = (u.basis(), v.basis());
+    let (nu, nv) = (basis_u.len(), basis_v.len());
+    let mut control = vec![DVec3::ZERO; nu * nv];
+    for i in 0..nu {
+        let column: Vec<DVec3> = rows.iter().map(|row| row[i]).collect();
+        for (j, point) in fitted_v.refine(&column, &v).into_iter().enumerate() {
+            control[j * nu + i] = point;
+        }
+    }
+    for k in 0..4 {
+        let mut curve = given[k].control.to_vec();
+        if given[k].reversed {
+            curve.reverse();
+        }
+        let row = Breaks::uniform(curve.len() / 2 - 1).refine(&curve, &around[k]);
+        side_rows(k, nu, nv).into_iter().zip(row).for_each(|((at, _), point)| control[at] = point);
+    }
+    for (k, ribbon) in ribbons.iter().enumerate() {
+        let Some(ribbon) = ribbon else { continue };
+        let places = side_rows(k, nu, nv);
+        // The first and the last lie on the sides before and after, which are given.
+        for (&(on, beside), step) in places.iter().zip(ribbon).take(places.len() - 1).skip(1) {
+            control[beside] = control[on] + *step;
+        }
+    }
+    Net { basis_u, basis_v, control }
+}
+
+/// Into how many pieces each span of edge `e` is to be divided, and the largest angle along it, degrees.
+fn divide(setting: &Setting<'_>, nets: &[Net], breaks: &Breaks, e: usize, limit: f64) -> (Vec<usize>, f64) {
+    let mut pieces = vec![1; breaks.as_slice().len() - 1];
+    let other = match (&setting.beside[e][..], setting.roles[e], &setting.tangent_to[e]) {
+        (&[_, b], EdgeRole::Smooth, _) => Other::Patch(b),
+        (&[_], _, Some(shape)) => Other::Shape(shape),
+        _ => return (pieces, 0.0),
+    };
+    let one = setting.beside[e][0];
+    let mut largest = 0.0f64;
+    for (k, w) in breaks.as_slice().windows(2).enumerate() {
+        let angle = PLACES
+            .iter()
+            .map(|x| angle(setting.layout, nets, e, one, &other, w[0] + x * (w[1] - w[0])))
+            .fold(0.0, f64::max);
+        largest = largest.max(angle);
+        if angle > MARGIN * limit && w[1] - w[0] > SHORTEST {
+            pieces[k] = if angle > QUARTER * limit && w[1] - w[0] > 2.0 * SHORTEST { 4 } else { 2 };
+        }
+    }
+    (pieces, largest)
+}
+
+/// What a patch meets.
+enum Other<'a> {
+    Patch((u32, u8)),
+    Shape(&'a RegionShape),
+}
+
+/// The angle between the normals on both sides of edge `e` at its parameter `t`, degrees.
+fn angle(layout: &QuadLayout, nets: &[Net], e: usize, one: (u32, u8), other: &Other<'_>, t: f64) -> f64 {
+    let at = |(quad, side): (u32, u8)| -> SurfacePoint {
+        let reversed = layout.quads[quad as usize][side as usize].reversed;
+        debug_assert_eq!(layout.quads[quad as usize][side as usize].edge as usize, e);
+        let (u, v) = Patch::side_parameters(side as usize, if reversed { 1.0 - t } else { t });
+        let net = &nets[quad as usize];
+        crate::surface::evaluate(&net.basis_u, &net.basis_v, &net.control, u, v)
+    };
+    let here = at(one);
+    let beyond = match other {
+        Other::Patch(other) => at(*other).normal(),
+        Other::Shape(shape) => shape.normal(here.position),
+    };
+    let here = here.normal();
+    here.cross(beyond).length().atan2(here.dot(beyond)).to_degrees()
+}
