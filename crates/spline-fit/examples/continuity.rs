@@ -81,8 +81,19 @@ fn main() -> Result<(), Box<dyn Error>> {
             _ => continue,
         };
         let mut worst = (0.0f64, 0.0);
-        for k in 0..=64 {
-            let t = f64::from(k) / 64.0;
+        // Between any two knots of the two patches.
+        let mut knots = vec![0.0, 1.0];
+        for &(p, side, reversed) in [Some(a), b].into_iter().flatten() {
+            let patch: &Patch = &surface.patches[p];
+            let basis = if side % 2 == 0 { &patch.basis_u } else { &patch.basis_v };
+            let against = reversed != (side >= 2);
+            knots.extend(basis.breaks().iter().map(|t| if against { 1.0 - t } else { *t }));
+        }
+        knots.sort_by(f64::total_cmp);
+        knots.dedup();
+        let places =
+            knots.windows(2).flat_map(|w| (0..6).map(move |k| w[0] + f64::from(k) / 6.0 * (w[1] - w[0])));
+        for t in places.chain([1.0]) {
             let normal = |&(p, side, reversed): &(usize, usize, bool)| {
                 let (u, v) = Patch::side_parameters(side, if reversed { 1.0 - t } else { t });
                 surface.patches[p].evaluate(u, v).normal()
@@ -126,6 +137,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             if b.is_none() { "border" } else { "edge" },
             curve.position(t)
         );
+        let speeds: Vec<String> = (0..=16)
+            .map(|k| {
+                let t = f64::from(k) / 16.0;
+                let step = 1e-4;
+                let d = curve.position((t + step).min(1.0)) - curve.position((t - step).max(0.0));
+                let way = (curve.control[curve.control.len() - 1] - curve.control[0]) / chord;
+                format!("{:.1}/{:.1}", d.dot(way) / (2.0 * step) / chord, d.length() / (2.0 * step) / chord)
+            })
+            .collect();
+        println!("      speed towards the end / speed: {}", speeds.join(" "));
         for (p, side, reversed) in [Some(a), b].into_iter().flatten() {
             let line: Vec<String> = (0..=8)
                 .map(|k| {
@@ -163,6 +184,34 @@ fn far(layout: &topipe_quad_matching::QuadLayout, surface: &topipe_spline_fit::S
         if (q as usize) < faces.len() {
             faces[q as usize].push(topipe_mesh::FaceId::new(f));
         }
+    }
+    let mut borders: Vec<(f64, usize, topipe_mesh::DVec3)> = Vec::new();
+    for (e, edge) in layout.edges.iter().enumerate().filter(|(e, _)| *e < surface.edges.len()) {
+        let curve = &surface.edges[e];
+        if uses_of(layout, e) == 2 {
+            continue;
+        }
+        let points: Vec<topipe_mesh::DVec3> =
+            (0..=200).map(|k| curve.position(f64::from(k) / 200.0)).collect();
+        let worst = edge
+            .path
+            .iter()
+            .map(|&v| {
+                let p = mesh.position(v);
+                (points.iter().map(|q| q.distance(p)).fold(f64::INFINITY, f64::min), e, p)
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        borders.extend(worst);
+    }
+    borders.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (d, e, at) in borders.iter().take(12) {
+        println!(
+            "  border {:.2e} edge {e} {:?} feature {:?} vertices {}",
+            d / mesh.diagonal(),
+            at,
+            surface.edges[*e].feature,
+            layout.edges[*e].path.len()
+        );
     }
     let n = 64;
     let mut list: Vec<(f64, usize, topipe_mesh::DVec3, (f64, f64))> = Vec::new();
@@ -284,4 +333,8 @@ fn folded(layout: &topipe_quad_matching::QuadLayout, surface: &topipe_spline_fit
         "{count} folded patches: {} with a turned corner, {} with a wide cone, {} of few faces, {} along the border only",
         tallies[0], tallies[1], tallies[2], tallies[3]
     );
+}
+
+fn uses_of(layout: &topipe_quad_matching::QuadLayout, e: usize) -> usize {
+    layout.quads.iter().flatten().filter(|s| s.edge as usize == e).count()
 }

@@ -10,7 +10,7 @@
 //! the shape's tangent plane.
 
 use crate::fans::{EdgeRole, Sector, Spoke};
-use crate::frames::{CORNER, Given};
+use crate::frames::Given;
 use crate::local_surface::{Known, local_surface};
 use rayon::prelude::*;
 use topipe_mesh::DVec3;
@@ -18,11 +18,11 @@ use topipe_mesh::DVec3;
 /// From this angle between the tangent plane that is asked for and the mesh's own on, there is a corner: cosine of 25
 /// degrees. Of the tangent planes that two borders fix in the nine example parts half are within 6 degrees of the
 /// mesh's, the others between 25 and 90.
-const FAR: f64 = 0.906;
+pub(crate) const FAR: f64 = 0.906;
 
 /// A border that leaves a shape's tangent plane by more than this angle (the sine of 0.03 degrees) does not lie in it:
 /// no patch between the border and the shape is tangent to the shape at its corner.
-const LEAVES: f64 = 5e-4;
+pub(crate) const LEAVES: f64 = 5e-4;
 
 /// What is not smooth after all.
 #[derive(Debug, Default, PartialEq)]
@@ -82,7 +82,7 @@ fn corner(
         .collect();
     let [a, b] = [directions[0]?, directions[1]?];
     let across = a.cross(b);
-    let twisted = across.length() > CORNER && (across.normalize().dot(own).abs() < FAR);
+    let twisted = across.length() > LEAVES && (across.normalize().dot(own).abs() < FAR);
     if !twisted || sector.quads.len() < 2 {
         return Some((None, sharp));
     }

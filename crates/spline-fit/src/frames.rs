@@ -1,6 +1,7 @@
 //! The surface at the macro-vertices: where they are, the tangent plane of each sector, and the directions of the
 //! edges in it.
 
+use crate::corners::{FAR, LEAVES};
 use crate::crease_curves::{PASSES, direction};
 use crate::fans::{EdgeRole, Sector, Sectors, Spoke};
 use crate::local_surface::{Known, LocalSurface, local_surface};
@@ -121,7 +122,7 @@ pub(crate) fn crease_tangents(given: &Given<'_>) -> Vec<Option<DVec3>> {
 }
 
 /// Two directions at a corner give its normal where the angle between them is at least this: sine of 20 degrees.
-pub(crate) const CORNER: f64 = 0.342;
+const CORNER: f64 = 0.342;
 
 impl Frames {
     pub(crate) fn new(given: &Given<'_>, tangents: &[Option<DVec3>]) -> Result<Self, SplineFitError> {
@@ -188,9 +189,11 @@ fn frame(
         [a] => Known::Tangent(a),
         [a, .., b] => {
             let across = a.cross(b);
-            if across.length() > CORNER {
-                let rough = fit(Known::Point).normal;
-                let normal = across.normalize();
+            let rough = fit(Known::Point).normal;
+            let normal = across.normalize_or_zero();
+            // Nearly parallel directions fix the plane too, but where noise turns it away from the mesh, and there is no
+            // edge between them to become a crease, the mesh's own is taken.
+            if across.length() > CORNER || across.length() > LEAVES && normal.dot(rough).abs() >= FAR {
                 Known::Normal(if normal.dot(rough) < 0.0 { -normal } else { normal })
             } else {
                 // One curve that passes through, in opposite directions, or two that leave side by side.

@@ -3,7 +3,7 @@
 use crate::SplineFitError;
 use crate::borders::sharpness;
 use crate::borders::{Borders, borders};
-use crate::corners::corners;
+use crate::corners::{Corners, corners};
 use crate::fans::{EdgeRole, Sectors, quads_beside};
 use crate::frames::{Given, crease_tangents};
 use crate::samples::PatchSamples;
@@ -16,6 +16,9 @@ const REACH: f64 = 1.25;
 /// From this number of spans on the local fits stay as they are: knots then make the surface follow its normals, and
 /// no longer finer waves of the mesh.
 const FINEST_REACH: usize = 4;
+
+/// Rounds in which corners are looked for: one finds nearly all, the second those at the other ends of its creases.
+const CORNER_ROUNDS: usize = 4;
 
 /// Roles of the edges, borders, and the fans around the vertices.
 pub(crate) struct Setting<'a> {
@@ -100,25 +103,31 @@ impl<'a> Setting<'a> {
     /// Gives up tangency where the mesh has corners.
     pub(crate) fn make_corners(&mut self, samples: &[PatchSamples], spans: usize, progress: &Progress) {
         let reach = self.reach(&vec![spans; self.lengths.len()]);
-        let given = self.given(samples, &reach);
-        let corners = corners(&given, &crease_tangents(&given));
-        for &e in &corners.creases {
-            self.roles[e] = EdgeRole::Crease;
-            self.features[e] = Some(FeatureKind::Sharp);
-        }
-        for &e in &corners.sharp_borders {
-            self.tangent_to[e] = None;
-            self.features[e] = Some(FeatureKind::RegionBorder);
-            if let Some(curve) = &mut self.borders.curves[e] {
-                curve.feature = self.features[e];
+        let mut creases = 0;
+        // A crease may end at another border, and need another one there.
+        for _ in 0..CORNER_ROUNDS {
+            let given = self.given(samples, &reach);
+            let corners = corners(&given, &crease_tangents(&given));
+            if corners == Corners::default() {
+                break;
             }
-        }
-        if !corners.creases.is_empty() {
+            for &e in &corners.creases {
+                self.roles[e] = EdgeRole::Crease;
+                self.features[e] = Some(FeatureKind::Sharp);
+            }
+            for &e in &corners.sharp_borders {
+                self.tangent_to[e] = None;
+                self.features[e] = Some(FeatureKind::RegionBorder);
+                if let Some(curve) = &mut self.borders.curves[e] {
+                    curve.feature = self.features[e];
+                }
+            }
+            creases += corners.creases.len();
             self.sectors = Sectors::new(self.layout, &self.roles);
-            progress.remark(&format!(
-                "{} edges run into corners of borders and are creases that fade",
-                corners.creases.len()
-            ));
+        }
+        if creases > 0 {
+            progress
+                .remark(&format!("{creases} edges run into corners of borders and are creases that fade"));
         }
     }
 }

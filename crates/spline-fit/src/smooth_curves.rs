@@ -93,7 +93,16 @@ pub(crate) fn smooth_curve(
         end_data[0].1 * speed(first, points[1] - points[0], end_data[0].1),
         -end_data[1].1 * speed(last, points[spans - 1] - points[spans], end_data[1].1),
     ];
-    let slopes = curvature_continuous(&mut points, ends, [&surfaces[0], &surfaces[spans]]);
+    let measured = points.clone();
+    let mut slopes = curvature_continuous(&mut points, ends, [&surfaces[0], &surfaces[spans]]);
+    if runs_back(&hermite::control(&points, &slopes), &path) {
+        // Without the curvature at the ends, and if need be without the points between.
+        points = measured;
+        slopes = clamped(&points, ends);
+        if runs_back(&hermite::control(&points, &slopes), &path) {
+            (points, slopes) = single_cubic([points[0], points[spans]], ends, spans);
+        }
+    }
     let across = |(surface, slope): (&LocalSurface, &DVec3)| {
         let along = slope.try_normalize()?;
         (surface.normal - surface.normal.dot(along) * along).try_normalize()
@@ -148,6 +157,38 @@ fn curvature_continuous(points: &mut [DVec3], ends: [DVec3; 2], surfaces: [&Loca
         }
     }
     clamped(points, ends)
+}
+
+/// Places in each span where the direction of a curve is looked at.
+const LOOKS: usize = 4;
+
+/// Whether a curve runs back along the path that it is to follow. Short edges over rough places ask for that: local fits
+/// of neighbouring breaks that overlap, or a curvature at an end that is that of a fold of the mesh. Along a loop neither
+/// normals nor patches can follow. The directions at the ends themselves are what they are.
+fn runs_back(control: &[DVec3], path: &[DVec3]) -> bool {
+    let spans = control.len() / 2 - 1;
+    let reach = 0.5 / spans as f64;
+    (1..LOOKS * spans).any(|k| {
+        let t = k as f64 / (LOOKS * spans) as f64;
+        let onwards = point_at(path, (t + reach).min(1.0)) - point_at(path, (t - reach).max(0.0));
+        hermite::derivatives(control, t)[1].dot(onwards) <= 0.0
+    })
+}
+
+/// Points and slopes at the breaks of one cubic with the given ends, its speeds those of the chord.
+fn single_cubic(points: [DVec3; 2], ends: [DVec3; 2], spans: usize) -> (Vec<DVec3>, Vec<DVec3>) {
+    let chord = points[1] - points[0];
+    let slope = |end: DVec3| {
+        let direction = end.normalize_or_zero();
+        direction * speed(chord.length(), chord, direction)
+    };
+    let control = hermite::control(&points, &ends.map(slope));
+    (0..=spans)
+        .map(|k| {
+            let [point, slope, _] = hermite::derivatives(&control, k as f64 / spans as f64);
+            (point, slope)
+        })
+        .unzip()
 }
 
 /// The second derivative by the parameter at the first point.
