@@ -101,6 +101,10 @@ fn median(mut times: Vec<f64>) -> f64 {
     times[times.len() / 2]
 }
 
+fn least(times: Vec<f64>) -> f64 {
+    times.into_iter().fold(f64::INFINITY, f64::min)
+}
+
 fn nothing_to_do() {
     for stages in [10, 1000] {
         let bench = Bench::new();
@@ -136,33 +140,43 @@ fn verify() {
     };
     // Turn and turn about, so that what else goes on hits both.
     let (mut theirs, mut mine) = (Vec::new(), Vec::new());
-    for _ in 0..7 {
+    for _ in 0..25 {
         theirs.push(raw());
         mine.push(ours());
     }
     let speed = |time: f64| bytes as f64 / time / 1e9;
-    let (theirs, mine) = (speed(median(theirs)), speed(median(mine)));
-    println!("verify: {mine:.2} GB/s, raw blake3 {theirs:.2} GB/s: {:.0} %", 100.0 * mine / theirs);
+    // The best of each is what the machine can do; on a shared one medians jump.
+    for (what, of) in [("best", least as fn(Vec<f64>) -> f64), ("median", median)] {
+        let (theirs, mine) = (speed(of(theirs.clone())), speed(of(mine.clone())));
+        println!(
+            "verify, {what}: {mine:.2} GB/s, raw blake3 {theirs:.2} GB/s: {:.0} %",
+            100.0 * mine / theirs
+        );
+    }
 }
 
 fn per_stage() {
-    let stages = 200;
-    let bench = Bench::new();
-    let run = bench.run(&chains(stages, 1000)) / stages as f64;
-    // An artifact and a record, flushed, as a run writes them.
-    let write = |name: String, bytes: &[u8]| {
-        let temporary = bench.folder.path().join("t");
-        let mut file = File::create(&temporary).unwrap();
-        file.write_all(bytes).unwrap();
-        file.sync_data().unwrap();
-        std::fs::rename(&temporary, Path::new(bench.folder.path()).join(name)).unwrap();
-    };
-    let start = Instant::now();
-    for k in 0..stages {
-        write(format!("a{k}"), &[1; 1100]);
-        write(format!("k{k}"), &[1; 400]);
+    let stages = 40;
+    let (mut runs, mut flushes) = (Vec::new(), Vec::new());
+    for _ in 0..9 {
+        let bench = Bench::new();
+        runs.push(bench.run(&chains(stages, 1000)) / stages as f64);
+        // An artifact and a record, flushed, as a run writes them.
+        let write = |name: String, bytes: &[u8]| {
+            let temporary = bench.folder.path().join("t");
+            let mut file = File::create(&temporary).unwrap();
+            file.write_all(bytes).unwrap();
+            file.sync_data().unwrap();
+            std::fs::rename(&temporary, Path::new(bench.folder.path()).join(name)).unwrap();
+        };
+        let start = Instant::now();
+        for k in 0..stages {
+            write(format!("a{k}"), &[1; 1100]);
+            write(format!("k{k}"), &[1; 400]);
+        }
+        flushes.push(start.elapsed().as_secs_f64() / stages as f64);
     }
-    let flushes = start.elapsed().as_secs_f64() / stages as f64;
+    let (run, flushes) = (median(runs), median(flushes));
     println!("per executed stage: {:.2} ms, of which two flushed files {:.2} ms", run * 1e3, flushes * 1e3);
 }
 
