@@ -88,6 +88,10 @@ damage rounds="1000":
 batch parts="1000" seed="1":
     TOPIPE_BATCH={{parts}} TOPIPE_BATCH_SEED={{seed}} cargo test --release -p topipe-validation --test batch -- --nocapture
 
+# The guide as a web site, in target/book. Needs mdBook (cargo install mdbook).
+guide:
+    mdbook build docs
+
 # The remote cache in a bucket, against a server on this machine. Apart from the other tests: the feature brings an HTTP client.
 s3:
     cargo test -p topipe --features s3 --test command s3::

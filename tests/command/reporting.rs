@@ -25,6 +25,8 @@ fn the_report_is_written_when_what_it_shows_has_changed() {
     ] {
         assert!(page.contains(part), "no {part}");
     }
+    // The mesh before and after, for those who print it or allow no scripts.
+    assert_eq!(page.matches("<img src=\"data:image/png;base64,iVBORw0KGgo").count(), 2);
     // It is no export of the run: the record of a run cannot hold a file that shows the record.
     assert!(!shop.read("topipe-out/box/run.json").contains("report.html"));
     assert_eq!(shop.events(&[]), NOTHING);

@@ -76,6 +76,9 @@ fn the_summary_tells_states_outputs_and_figures() {
     for part in ["box (", "smooth  smoothing", "smooth.stl   written, ", "topipe-out/box", "check\n"] {
         assert!(ended.stdout.contains(part), "no `{part}` in\n{}", ended.stdout);
     }
+    // At a glance without being asked, everything with `-v`.
+    assert!(ended.stdout.contains("self-intersections: 0") && !ended.stdout.contains("432 triangles"));
+    assert!(shop.topipe(&["run", "box.toml", "-v"]).stdout.contains("432 triangles"));
     assert_eq!(shop.topipe(&["run", "box.toml", "-q"]).stdout, "");
 }
 

@@ -30,8 +30,19 @@ pub struct Document {
     pub histograms: Vec<Histogram>,
     /// The model.
     pub scene: Scene,
+    /// The model in small pictures.
+    pub pictures: Vec<Picture>,
     /// What could not be shown, and why.
     pub missing: Vec<String>,
+}
+
+/// A small picture of a layer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// What is seen.
+    pub name: String,
+    /// The file.
+    pub png: Vec<u8>,
 }
 
 /// The content of a `report.json`.

@@ -30,7 +30,7 @@ mod histogram;
 mod page;
 mod scene;
 
-pub use document::{Document, Export, Figures, Outcome, Parameter, Stage};
+pub use document::{Document, Export, Figures, Outcome, Parameter, Picture, Stage};
 pub use histogram::Histogram;
 pub use page::html;
 pub use scene::{Categories, ColorMaps, Field, Label, Lines, Points, Scene, Surface};

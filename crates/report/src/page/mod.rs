@@ -4,9 +4,11 @@ mod charts;
 mod figures;
 mod run;
 
-use crate::document::Document;
+use crate::document::{Document, Picture};
 use crate::encode::encode;
 use crate::figures::{Section, State};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use charts::distributions;
 use figures::{figures_section, headlines};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -123,7 +125,22 @@ fn model(document: &Document) -> Markup {
             } @else {
                 div #viewer { noscript { p.note { "The model needs scripts; everything below does not." } } }
             }
+            (pictures(&document.pictures))
             @for missing in &document.missing { p.note { (missing) } }
+        }
+    }
+}
+
+/// What is seen of the model in print and without scripts.
+fn pictures(pictures: &[Picture]) -> Markup {
+    html! {
+        @if !pictures.is_empty() {
+            div.pictures {
+                @for Picture { name, png } in pictures {
+                    @let url = format!("data:image/png;base64,{}", STANDARD.encode(png));
+                    figure { img src=(url) alt=(name) width="240" height="180"; figcaption { (name) } }
+                }
+            }
         }
     }
 }
@@ -153,6 +170,14 @@ mod tests {
         assert!(!page.contains("<script>alert") && page.contains("&lt;script&gt;alert"));
         assert!(page.contains("known; the mesh is open") && page.contains("CAD surface: not in this report"));
         assert!(page.contains("There is no result with a shape to show."));
+    }
+
+    #[test]
+    fn pictures_are_in_the_page_with_their_names() {
+        let picture = Picture { name: "Original mesh".into(), png: vec![1, 2, 3] };
+        let page = html(&Document { pictures: vec![picture], ..Document::default() });
+        let expected = "<img src=\"data:image/png;base64,AQID\" alt=\"Original mesh\"";
+        assert!(page.contains(expected));
     }
 
     #[test]

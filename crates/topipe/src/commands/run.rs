@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &RunArguments, verbosity: Verbosity) -> Result<Exit
         let (figures, broken) = match table {
             Some(table) => (vec![("sweep.csv".to_owned(), table.text())], None),
             None => {
-                let measured = measured(&record, &cache);
+                let measured = measured(&record, &cache, verbosity);
                 let broken: Vec<_> = measured.iter().filter_map(|m| m.broken.as_ref()).collect();
                 let broken =
                     (!broken.is_empty()).then(|| broken.into_iter().flatten().cloned().collect::<Vec<_>>());
@@ -101,8 +101,8 @@ struct Measured {
     broken: Option<Vec<topipe_report::figures::Finding>>,
 }
 
-/// The main figures of each report and each stiffness of the run.
-fn measured(record: &RunRecord, cache: &Cache) -> Vec<Measured> {
+/// The main figures of each report and each stiffness of the run; all of them for those who want to hear more.
+fn measured(record: &RunRecord, cache: &Cache, verbosity: Verbosity) -> Vec<Measured> {
     let mut measured = Vec::new();
     for stage in &record.stages {
         let Some(artifact) = stage.artifact else { continue };
@@ -114,7 +114,11 @@ fn measured(record: &RunRecord, cache: &Cache) -> Vec<Measured> {
                 && let Some(report) = value.downcast_ref::<topipe_validation::Report>()
             {
                 let broken = Some(crate::report::broken(report));
-                measured.push(Measured { stage: name, text: report.summary(), broken });
+                let text = match verbosity {
+                    Verbosity::Verbose => report.summary(),
+                    _ => crate::report::headlines(report),
+                };
+                measured.push(Measured { stage: name, text, broken });
             }
         } else if stage.artifact_kind == Stiffness::NAME {
             let loaded = cache.load(&ArtifactType::of::<Stiffness>(), artifact, &mut Vec::new());

@@ -4,6 +4,7 @@
 //! it shows has changed; a run that finds all results in the cache leaves it alone, so that the times in it stay those of
 //! the run that took them.
 
+mod pictures;
 mod results;
 mod scene;
 mod surface_mesh;
@@ -168,6 +169,7 @@ fn document(record: &RunRecord, cache: &Cache, registry: &Registry) -> Document 
         diagram: crate::diagram::of_record(record),
         figures,
         histograms,
+        pictures: pictures::pictures(&scene),
         scene,
         missing: results.missing.iter().chain(&left_out).cloned().collect(),
     }
@@ -177,6 +179,29 @@ fn document(record: &RunRecord, cache: &Cache, registry: &Registry) -> Document 
 pub(crate) fn broken(report: &topipe_validation::Report) -> Vec<topipe_report::figures::Finding> {
     topipe_report::figures::broken(&serde_json::from_str(&report.to_json()).unwrap_or_default())
 }
+
+/// The main figures of a report that are not out of their limits, in a few lines.
+pub(crate) fn headlines(report: &topipe_validation::Report) -> String {
+    let value = serde_json::from_str(&report.to_json()).unwrap_or_default();
+    let findings = topipe_report::figures::sections(&value).into_iter().flat_map(|section| section.findings);
+    let mut lines = vec![String::new()];
+    for finding in
+        findings.filter(|f| !f.short.is_empty() && f.state != topipe_report::figures::State::Broken)
+    {
+        let figure = format!("{}: {}", finding.short.to_lowercase(), finding.value);
+        let last = lines.last_mut().filter(|line| line.len() + figure.len() < LINE);
+        match last {
+            Some(line) if line.is_empty() => *line = format!("  {figure}"),
+            Some(line) => *line += &format!("; {figure}"),
+            None => lines.push(format!("  {figure}")),
+        }
+    }
+    lines.push("  all figures: run again with -v, or see report.json".into());
+    lines.join("\n")
+}
+
+/// Characters of a line of main figures.
+const LINE: usize = 110;
 
 fn problems(record: &RunRecord) -> Vec<String> {
     let mut problems = Vec::new();
