@@ -44,6 +44,8 @@ impl Symmetric {
                     (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
                     (v[k][p], v[k][q]) = (c * v[k][p] - s * v[k][q], s * v[k][p] + c * v[k][q]);
                 }
+                // What rounding leaves here would keep the sweeps from ending.
+                (a[p][q], a[q][p]) = (0.0, 0.0);
             }
         }
         let mut order = [0, 1, 2];
