@@ -1,5 +1,8 @@
 // Drawing: one canvas with one or two panes, which share geometry and camera and show layers of their own.
 
+/** So many triangles of a surface are drawn while a slow card turns the model. */
+const TRIANGLES_IN_A_HURRY = 40000;
+
 const STEEL = [0.69, 0.745, 0.8];
 
 class Renderer {
@@ -100,12 +103,22 @@ class Renderer {
       const field = this.field(surface, number);
       this.buffer(3, Float32Array.from(source, (v) => field[v]), 1, gl.FLOAT, false);
     }
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, index, gl.STATIC_DRAW);
+    const indices = this.indices(index);
     gl.bindVertexArray(null);
-    const built = { array, count: index.length, solid: isSolid(points, triangles) };
+    const built = { array, indices, solid: isSolid(points, triangles), fewer: null };
+    // Made when it is first needed: on most cards it never is.
+    built.coarse = () => (built.fewer ??= this.indices(coarsened(index, places, group, TRIANGLES_IN_A_HURRY)));
+    if (index.length < 6 * TRIANGLES_IN_A_HURRY) built.coarse = () => indices;
     this.built.set(key, built);
     return built;
+  }
+
+  indices(index) {
+    const gl = this.gl;
+    const buffer = gl.createBuffer();
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, index, gl.STATIC_DRAW);
+    return { buffer, count: index.length };
   }
 
   lines(lines) {
@@ -213,11 +226,13 @@ class Renderer {
         this.bindField(u, field, field ? ranges.get(field) : 1);
         gl.uniform1i(u.uMode, mode);
         gl.uniform1f(u.uOpacity, opacity);
-        const { array, count, solid } = this.surface(surface, color);
+        const built = this.surface(surface, color);
+        gl.bindVertexArray(built.array);
+        const { buffer, count } = this.hurry ? built.coarse() : built.indices;
+        gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
         // The far side of a closed surface is never seen, but at silhouettes a pixel might catch it.
-        if ((solid && !this.plane) || opacity < 1) gl.enable(gl.CULL_FACE);
+        if ((built.solid && !this.plane) || opacity < 1) gl.enable(gl.CULL_FACE);
         else gl.disable(gl.CULL_FACE);
-        gl.bindVertexArray(array);
         gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
       }
     };
