@@ -129,3 +129,15 @@ skeleton-peers *options:
     test -d target/skeleton-peers || (python3 -m venv target/skeleton-peers && \
         target/skeleton-peers/bin/pip install -q numpy scipy trimesh networkx)
     target/skeleton-peers/bin/python crates/skeleton/benches/peers.py {{options}}
+
+# How time and memory grow with the number of triangles: the bracket smoothed, divided and roughened again.
+scale sizes="30000 100000 300000 1000000":
+    cargo build --release
+    cargo build --release -p topipe-smoothing --example finer
+    for n in {{sizes}}; do \
+        target/release/examples/finer fixtures/bracket/bracket $n target/scale/bracket-$n || exit 1; \
+        sed -e "s|../fixtures/bracket/bracket|../target/scale/bracket-$n|" -e 's|^units = .*|&\nallow_self_intersection = true|' \
+            pipelines/bracket.toml > target/scale-$n.toml; \
+        /usr/bin/time -f "$n triangles: %e s, %U s of processors, %M kB" target/release/topipe -q run target/scale-$n.toml \
+            --cache target/scale/cache --out target/scale/out-$n || exit 1; \
+    done
