@@ -370,6 +370,14 @@ fn run(bytes: &[u8]) -> Outcome {
     let failed = |stage: &str, error: &dyn std::fmt::Display| Outcome::Failed(format!("{stage}: {error}"));
     let smooth = match topipe_smoothing::smooth(&part, &Default::default(), &silent) {
         Ok(smooth) => smooth,
+        // Flat faces everywhere: what the message advises.
+        Err(topipe_smoothing::SmoothingError::EverythingFrozen { .. }) => {
+            let parameters = topipe_smoothing::Parameters { iterations: Some(0), ..Default::default() };
+            match topipe_smoothing::smooth(&part, &parameters, &silent) {
+                Ok(part) => part,
+                Err(error) => return failed("smoothing", &error),
+            }
+        }
         Err(error) => return failed("smoothing", &error),
     };
     let tiling = match topipe_tiling::tile(&smooth, &Default::default(), &silent) {

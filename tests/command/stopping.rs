@@ -148,7 +148,10 @@ fn stopped_in_the_fit(shop: &Workshop, percent: u64, signal: &str) -> (u64, u64)
 #[cfg(unix)]
 #[test]
 fn a_fit_interrupted_and_killed_near_its_end_is_taken_up_there() {
-    let killed = Workshop::with_part("y-form", FIT);
+    // Slow patches, so that there is time between two reports of how far it is.
+    let slow = FIT.replace("refinements = 0", "refinements = 0\nfoot_point_rounds = 20");
+    assert_ne!(slow, FIT);
+    let killed = Workshop::with_part("y-form", &slow);
     // First it is asked to stop, at a third; then it is killed.
     let (done, total) = stopped_in_the_fit(&killed, 30, "-INT");
     assert!(done < total);
@@ -163,7 +166,7 @@ fn a_fit_interrupted_and_killed_near_its_end_is_taken_up_there() {
     assert_eq!(reused + computed, total);
     // At most the patches in the making are lost, one a thread.
     assert!(reused + 64 >= done, "{reused} of {done} found again");
-    let clean = Workshop::with_part("y-form", FIT);
+    let clean = Workshop::with_part("y-form", &slow);
     assert_eq!(clean.topipe(&["-q", "run", "box.toml"]).code, 0);
     assert_eq!(killed.read("topipe-out/box/part.step"), clean.read("topipe-out/box/part.step"));
 }
