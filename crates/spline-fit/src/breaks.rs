@@ -21,6 +21,11 @@ impl Breaks {
         &self.0
     }
 
+    /// Number of spans.
+    pub(crate) fn spans(&self) -> usize {
+        self.0.len() - 1
+    }
+
     /// Width of the first span.
     pub(crate) fn first_width(&self) -> f64 {
         self.0[1] - self.0[0]
@@ -71,7 +76,7 @@ impl Breaks {
     where
         V: Copy + Add<Output = V> + Mul<f64, Output = V>,
     {
-        let last = self.0.len() - 1;
+        let last = self.spans();
         // The point at an inner break lies on the line through the control points beside it.
         let at = |k: usize| match k {
             0 => control[0],

@@ -4,7 +4,6 @@
 //! and slopes themselves, and nothing has to be solved for.
 
 use crate::Basis;
-use std::ops::{Add, Mul};
 use topipe_mesh::DVec3;
 
 /// The basis with `spans` equal spans, at least one, and double interior knots.
@@ -73,41 +72,6 @@ pub(crate) fn derivatives(control: &[DVec3], t: f64) -> [DVec3; 3] {
         3.0 * n * (y * y * (b - a) + 2.0 * x * y * (c - b) + x * x * (d - c)),
         6.0 * n * n * (y * (a - 2.0 * b + c) + x * (b - 2.0 * c + d)),
     ]
-}
-
-/// The same curve with every span halved (de Casteljau's algorithm at 1/2).
-pub(crate) fn halved<V>(control: &[V]) -> Vec<V>
-where
-    V: Copy + Add<Output = V> + Mul<f64, Output = V>,
-{
-    let spans = control.len() / 2 - 1;
-    let middle = |a: V, b: V| (a + b) * 0.5;
-    let at = |k: usize| match k {
-        0 => control[0],
-        k if k == spans => control[2 * spans + 1],
-        k => middle(control[2 * k], control[2 * k + 1]),
-    };
-    let mut finer = Vec::with_capacity(4 * spans + 2);
-    finer.push(control[0]);
-    for k in 0..spans {
-        let (a, b, c, d) = (at(k), control[2 * k + 1], control[2 * k + 2], at(k + 1));
-        let (ab, bc, cd) = (middle(a, b), middle(b, c), middle(c, d));
-        finer.extend([ab, middle(ab, bc), middle(bc, cd), cd]);
-    }
-    finer.push(control[2 * spans + 1]);
-    finer
-}
-
-/// The same curve with `spans` spans, a power of two times those it has.
-pub(crate) fn refined<V>(control: &[V], spans: usize) -> Vec<V>
-where
-    V: Copy + Add<Output = V> + Mul<f64, Output = V>,
-{
-    let mut finer = control.to_vec();
-    while finer.len() < 2 * spans + 2 {
-        finer = halved(&finer);
-    }
-    finer
 }
 
 /// A circle, or an arc of one, in a plane: `center + radius (cos u + sin v)`.
@@ -197,11 +161,6 @@ mod tests {
         }
     }
 
-    fn value(basis: &Basis, control: &[DVec3], t: f64, d: usize) -> f64 {
-        let local = basis.evaluate(t);
-        (0..local.count).map(|k| local.derivatives[d][k] * control[local.first + k].x).sum()
-    }
-
     #[test]
     fn local_functions_are_those_of_the_basis() {
         for spans in [1, 2, 4, 8] {
@@ -219,20 +178,6 @@ mod tests {
                     let pairs = dense(first, &own).into_iter().zip(dense(expected.first, &other[..4]));
                     assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-12), "{spans} spans at {t}");
                 }
-            }
-        }
-    }
-
-    #[test]
-    fn halving_changes_nothing() {
-        let coarse = control(&[1.0, -2.0, 0.5].map(DVec3::splat), &[0.3, 4.0, -1.0].map(DVec3::splat));
-        let fine = refined(&coarse, 8);
-        assert_eq!(fine.len(), 18);
-        for k in 0..=100 {
-            let t = k as f64 / 100.0;
-            for d in 0..2 {
-                let (a, b) = (value(&basis(2), &coarse, t, d), value(&basis(8), &fine, t, d));
-                assert!((a - b).abs() < 1e-12, "{t}");
             }
         }
     }

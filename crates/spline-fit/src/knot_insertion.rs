@@ -3,7 +3,8 @@
 //! A patch meets the normals along its side exactly at the breaks of its knots; between them the angle to them falls
 //! with the fourth power of the length of a span, near corners whose mixed derivatives do not agree with the square.
 //! Either way it falls, and where it matters only along a small part of an edge. So spans are divided where the angle
-//! is above its limit, on both sides of the edge, until it is nowhere, or spans have become too short to matter.
+//! is above its limit, on both sides of the edge, until it is nowhere, or spans have become too short to matter, or a patch
+//! too large.
 //!
 //! The inside of a patch has nothing to gain from such knots: it is fitted once, to few of them, they are inserted into
 //! it, and only the two rows of control points at the side are set anew.
@@ -29,6 +30,9 @@ const PLACES: [f64; 5] = [0.08, 0.3, 0.5, 0.7, 0.92];
 const MARGIN: f64 = 0.8;
 /// Above this multiple of the limit a span is quartered at once.
 const QUARTER: f64 = 16.0;
+/// Most cells of a patch, counted as if no two of its sides had a break in common: where angles never fall, or a limit of
+/// zero asks for it, knots end here. It is four times what a patch of 32 spans on each side has, and 1.6 MB of control points.
+const MOST_CELLS: usize = 16_384;
 
 /// Inserts knots until no angle along an edge that is no feature is above `limit` degrees, as far as that is possible.
 pub(crate) fn insert_knots(
@@ -46,7 +50,7 @@ pub(crate) fn insert_knots(
     let mut breaks: Vec<Breaks> = (0..layout.edges.len()).map(spans).collect();
     let mut nets: Vec<Net> = fitted.iter().map(|f| f.net.clone()).collect();
     let mut dirty: Vec<bool> = vec![true; layout.edges.len()];
-    let (mut inserted, mut largest) = (0, 0.0f64);
+    let mut inserted = 0;
     let mut angles = vec![0.0f64; layout.edges.len()];
     loop {
         let divisions: Vec<Option<(Vec<usize>, f64)>> = (0..layout.edges.len())
@@ -59,14 +63,18 @@ pub(crate) fn insert_knots(
             let Some((pieces, angle)) = division else { continue };
             angles[e] = angle;
             let more = pieces.iter().sum::<usize>() - pieces.len();
-            if more > 0 {
+            let fits = |&(q, side): &(u32, u8)| {
+                let spans = |k: usize| breaks[layout.quads[q as usize][k % 4].edge as usize].spans();
+                let k = side as usize;
+                (spans(k) + more + spans(k + 2)) * (spans(k + 1) + spans(k + 3)) <= MOST_CELLS
+            };
+            if more > 0 && setting.beside[e].iter().all(fits) {
                 inserted += more;
                 breaks[e] = breaks[e].divided(|k| pieces[k]);
                 setting.beside[e].iter().for_each(|&(q, _)| changed[q as usize] = true);
             }
         }
         if !changed.contains(&true) {
-            largest = angles.iter().fold(largest, |a, &b| a.max(b));
             break;
         }
         nets.par_iter_mut().enumerate().filter(|(q, _)| changed[*q]).for_each(|(q, net)| {
@@ -76,6 +84,7 @@ pub(crate) fn insert_knots(
             layout.quads[q].iter().for_each(|side| dirty[side.edge as usize] = true);
         }
     }
+    let largest = angles.iter().fold(0.0f64, |a, &b| a.max(b));
     progress.remark(&format!(
         "normals: {inserted} knots inserted along edges; {} edges above {limit} degrees, the largest {largest:.3}",
         angles.iter().filter(|&&a| a > limit).count()
@@ -138,7 +147,7 @@ fn with_knots(
 
 /// Into how many pieces each span of edge `e` is to be divided, and the largest angle along it, degrees.
 fn divide(setting: &Setting<'_>, nets: &[Net], breaks: &Breaks, e: usize, limit: f64) -> (Vec<usize>, f64) {
-    let mut pieces = vec![1; breaks.as_slice().len() - 1];
+    let mut pieces = vec![1; breaks.spans()];
     let other = match (&setting.beside[e][..], setting.roles[e], &setting.tangent_to[e]) {
         (&[_, b], EdgeRole::Smooth, _) => Other::Patch(b),
         (&[_], _, Some(shape)) => Other::Shape(shape),

@@ -4,6 +4,7 @@
 //! ribbon (see [`crate::ribbon`]) the control points beside it are given too. So the coordinates do not depend on each
 //! other, and a patch knows nothing of its neighbours: this is what makes it a unit of work of its own.
 
+use crate::breaks::Breaks;
 use crate::cholesky::Banded;
 use crate::energy::Gram;
 use crate::hermite;
@@ -142,7 +143,8 @@ pub(crate) fn fit_patch(
     let mut control = vec![DVec3::ZERO; nu * nv];
     let mut given = vec![false; nu * nv];
     for (k, border) in borders.iter().enumerate() {
-        let row = hermite::refined(&border.control, if k % 2 == 0 { ku } else { kv });
+        let own = Breaks::uniform(border.control.len() / 2 - 1);
+        let row = own.refine(&border.control, &Breaks::uniform(if k % 2 == 0 { ku } else { kv }));
         for ((at, _), point) in side_rows(k, nu, nv).into_iter().zip(row) {
             control[at] = point;
             given[at] = true;

@@ -55,6 +55,18 @@ fn knots_are_inserted_until_the_normals_agree() {
     }
 }
 
+/// A limit that can not be met ends all the same, with patches of bounded size.
+#[test]
+fn a_limit_of_zero_ends() {
+    let layout = layout(&sphere(3), 2.5);
+    let parameters = Parameters { refinements: 0, max_normal_jump: 0.0, ..Default::default() };
+    let surface = fit(&layout, &parameters, &Units::none(), &Progress::silent()).unwrap();
+    let most = surface.patches.iter().map(|p| p.control.len()).max().unwrap();
+    // Two control points a span in both directions, and what the ends add.
+    assert!((10_000..80_000).contains(&most), "{most} control points");
+    assert!(largest_jump(&surface) < 1e-3);
+}
+
 /// A topology optimization result, smoothed: narrow struts, noise, borders of planes and holes.
 #[test]
 fn patches_of_a_real_part_meet_with_a_common_tangent_plane() {
