@@ -159,13 +159,31 @@ impl Tessellation<'_> {
         released
     }
 
+    /// Holds the faces around the site of each violating tile that lost some of them. Around a long thin face a site may
+    /// be farther from the face's centroid than its neighbour, which then cuts the tile in two right at its site, and
+    /// no further site heals that. True when there was one; tiles are grown anew then. Ends: a site is held once.
+    fn hold(&mut self, violations: &[(VertexId, Vec<u32>)]) -> bool {
+        let mut held = false;
+        for &tile in violations.iter().flat_map(|(_, tiles)| tiles) {
+            let site = &self.sites[tile as usize];
+            if !site.held && self.star(site.vertex).iter().any(|f| self.growth.owner[f.index()] != tile) {
+                self.sites[tile as usize].held = true;
+                held = true;
+            }
+        }
+        if held {
+            self.regrow();
+        }
+        held
+    }
+
     /// Rounds of repair until no violation is left.
     pub(crate) fn repair(&mut self) -> Result<(), TilingError> {
         let mut left = Vec::new();
         for round in 0..MOST_ROUNDS {
             self.progress.check()?;
             let violations = self.violations();
-            if self.release(&violations, round >= PATIENCE) {
+            if self.release(&violations, round >= PATIENCE) || self.hold(&violations) {
                 continue;
             }
             if !violations.is_empty() {

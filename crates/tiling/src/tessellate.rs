@@ -20,6 +20,8 @@ pub(crate) struct Site {
     pub(crate) anchor: bool,
     /// Faces along the curves through an anchor, with their distances.
     pub(crate) along: Vec<(FaceId, f64)>,
+    /// The faces around the vertex can not be taken by another site; see [`Tessellation::hold`].
+    pub(crate) held: bool,
 }
 
 /// A tessellation under construction.
@@ -108,13 +110,16 @@ impl Tessellation<'_> {
         for face in self.star(vertex) {
             self.occupied[face.index()] = true;
         }
-        self.sites.push(Site { vertex, anchor, along: Vec::new() });
+        self.sites.push(Site { vertex, anchor, along: Vec::new(), held: false });
         self.sites.len() as u32 - 1
     }
 
     pub(crate) fn seeds_of(&self, site: u32) -> Vec<(u32, FaceId, f64)> {
         let s = &self.sites[site as usize];
-        let star = self.growth.star(&self.refiner, s.vertex);
+        let mut star = self.growth.star(&self.refiner, s.vertex);
+        if s.held {
+            star.iter_mut().for_each(|(_, distance)| *distance = 0.0);
+        }
         star.into_iter().chain(s.along.iter().copied()).map(|(f, d)| (site, f, d)).collect()
     }
 

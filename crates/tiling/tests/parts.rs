@@ -186,3 +186,15 @@ proptest! {
         }
     }
 }
+/// Sites beside long thin faces: a neighbour is nearer to the centroid of such a face than the site whose face it is.
+#[test]
+fn lumpy_thin_tori_are_tiled() {
+    for k in [11, 20, 70, 72, 81, 90, 108, 110, 120, 126] {
+        let (n, m, minor) = (3 + k % 9, 5 + k % 8, 0.1 + 0.01 * f64::from(k % 10));
+        let mut part = torus(n, m, minor);
+        for (i, p) in part.mesh.positions.iter_mut().enumerate() {
+            p.z += ((0.618034 * f64::from(k) * i as f64).fract() - 0.5) * 0.6 * minor;
+        }
+        tiled(&part, &Parameters { tile_size: 1.0, faces_per_tile: 8, ..source() });
+    }
+}
