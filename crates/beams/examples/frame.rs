@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for remark in structure.remarks.iter().chain(&solid.remarks) {
         println!("{remark}");
     }
-    write::step(&solid.brep, "frame", &mut file("frame.step")?)?;
+    write::step(&solid.brep, "frame", write::Protocol::Ap214, &mut file("frame.step")?)?;
     topipe_mesh::write::stl(&solid::triangulate(&solid.brep, 0.2), &mut file("frame.stl")?)?;
     println!(
         "{} beams, {} nodes, {} faces",

@@ -12,6 +12,7 @@ pub use calculix::calculix;
 pub use dxf::dxf;
 pub use json::json;
 pub use step::step;
+pub use topipe_step::Protocol;
 
 use crate::Structure;
 use std::io::{self, Write};

@@ -1,12 +1,13 @@
 //! Vertices, edges and faces.
 
-use super::entities::{Entities, knots, real, references};
+use super::knots::knots;
 use super::pcurves::{self, Frame};
 use super::seams::{End, Seam, seam};
 use super::style::names;
 use crate::{AnalyticFace, CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface};
 use std::io::{self, Write};
 use topipe_mesh::{DVec3, RegionShape};
+use topipe_step::{Entities, real, references};
 
 /// Vertices nearer than this share of the diagonal to one ruling are on it.
 const SAME_RULING: f64 = 1e-11;

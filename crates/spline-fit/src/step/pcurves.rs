@@ -5,11 +5,12 @@
 //! 7e-4 mm between its points where the second derivative of the spline jumps, and the gap between the two faces is as
 //! large. So those are written: angle and height of the curve as splines with its own parameter.
 
-use super::entities::{Entities, knots, real, references};
+use super::knots::knots;
 use crate::{EdgeCurve, hermite};
 use std::f64::consts::TAU;
 use std::io::{self, Write};
 use topipe_mesh::DVec3;
+use topipe_step::{Entities, real, references};
 
 /// A cylinder and the direction from which its angle is counted.
 #[derive(Debug, Clone, Copy)]

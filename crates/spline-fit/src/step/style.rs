@@ -1,9 +1,9 @@
 //! Names and colors, so that features are found again in the CAD system.
 
-use super::entities::{Entities, real, references};
 use crate::SplineSurface;
 use std::io::{self, Write};
 use topipe_mesh::RegionShape;
+use topipe_step::{Entities, real, references};
 
 /// Red, green, blue from 0 to 1.
 type Color = [f64; 3];

@@ -2,6 +2,7 @@
 
 use crate::artifacts::Beams;
 use topipe_beams::solid::{Solid, solid, triangulate};
+use topipe_beams::write::Protocol;
 use topipe_beams::{Structure, write};
 use topipe_engine::{ExportError, Exporter};
 use topipe_mesh::write as mesh;
@@ -25,10 +26,13 @@ pub(super) fn exporters() -> Vec<Exporter> {
             Ok(write::calculix(structure, name, &mut file)?)
         }),
         Exporter::new::<Beams>("step", version, |structure, name, mut file| {
-            Ok(write::step(&build(structure)?.brep, name, &mut file)?)
+            Ok(write::step(&build(structure)?.brep, name, Protocol::Ap214, &mut file)?)
         }),
         Exporter::new::<Beams>("stp", version, |structure, name, mut file| {
-            Ok(write::step(&build(structure)?.brep, name, &mut file)?)
+            Ok(write::step(&build(structure)?.brep, name, Protocol::Ap214, &mut file)?)
+        }),
+        Exporter::new::<Beams>("ap242.step", version, |structure, name, mut file| {
+            Ok(write::step(&build(structure)?.brep, name, Protocol::Ap242, &mut file)?)
         }),
         Exporter::new::<Beams>("stl", version, |structure, _, mut file| {
             Ok(mesh::stl(&triangulate(&build(structure)?.brep, TURN), &mut file)?)
