@@ -4,33 +4,15 @@
 //! topology optimization.
 
 use std::time::Instant;
-use topipe_fem::{Attachment, Body, Grid, Load, LoadCase, Model, Region, Selectors, Support, fractions};
-use topipe_mesh::TriangleMesh;
+use topipe_fem::{Attachment, Body, Grid, Load, LoadCase, Model, Region, Selectors, Support};
+use topipe_mesh::{DVec3, TriangleMesh};
 use topipe_progress::Progress;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let argument = |k: usize, default: f64| std::env::args().nth(k).map_or(Ok(default), |a| a.parse::<f64>());
     let (cells, contrast) = (argument(1, 1e6)?, argument(2, 1.0)?);
     let n = (cells / 2.0).cbrt().round();
-    let corners =
-        (0..8).map(|k| [2.0 * n * (k & 1) as f64, n * (k >> 1 & 1) as f64, n * (k >> 2) as f64]).collect();
-    let bar = TriangleMesh::from_arrays(
-        corners,
-        vec![
-            [0, 2, 1],
-            [1, 2, 3],
-            [4, 5, 6],
-            [5, 7, 6],
-            [0, 1, 4],
-            [1, 5, 4],
-            [2, 6, 3],
-            [3, 6, 7],
-            [0, 4, 2],
-            [2, 4, 6],
-            [1, 3, 5],
-            [3, 7, 5],
-        ],
-    );
+    let bar = TriangleMesh::cuboid(DVec3::ZERO, DVec3::new(2.0 * n, n, n));
     let face = |x| Region::Box { min: [x, 0.0, 0.0], max: [x, n, n] };
     let load_case = LoadCase {
         young: 70_000.0,
@@ -41,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let start = Instant::now();
     let (low, high) = bar.bounds();
     let grid = Grid::around(low, high, 1.0, 0);
-    let body = Body { grid, fraction: fractions(&bar, &grid) };
+    let body = Body::new(&bar, grid);
     println!("{} cells; voxelized after {:.2} s", grid.count(), start.elapsed().as_secs_f64());
     let selectors = Selectors::new(&load_case, None, None, 1e-6)?;
     let attachment = Attachment::new(&load_case, &bar, &selectors, "", grid.size)?;

@@ -1,27 +1,35 @@
 //! A voxel model: cells with moduli, nodes that are held, forces on nodes.
 
 use crate::error::{number, point};
+use crate::moments::Cuts;
+use crate::solver::bedding::Bedding;
 use crate::solver::coarse::Particular;
+use crate::solver::cut::CutCells;
 use crate::solver::multigrid::Hierarchy;
 use crate::surface::{Attachment, SurfacePoint};
-use crate::{FemError, Grid, Hexahedron, Lattice, rigid};
+use crate::{FemError, Grid, Hexahedron, Lattice, fractions, rigid};
 use glam::DVec3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use topipe_mesh::TriangleMesh;
 
 /// Cells with less material than this are left out. They would hold on to little and make the equations harder; the volume
 /// they have is below 0.1 % of a part of some cells' thickness.
 const LEAST_FRACTION: f32 = 0.02;
 
-/// A support or a load acts on a cell only if that has so much material; else on the next one inwards.
+/// Where cells count as softer material, a support or a load acts on a cell only if that has so much; else on the next one
+/// inwards.
 const FIRM: f32 = 0.4;
 
-/// Stiffness of the bedding by which a surface between grid planes is held, in moduli per cell, against what presses on it and
-/// against what shears along it. Infinitely stiff, all nodes of the cells that the surface passes through would be fixed, which
-/// holds the part a part of a cell too far inside (19 % too stiff in the first test below). Errors of the compliance of a ring
-/// held at its bore, 4 and 8 cells to the radius (`tests/elasticity.rs`), pressed: 6 and 2: 1.1 and -0.2 %; 6 and 1.4: 1.5 and
-/// 0.0 %; 7 and 1.6: 0.5 and -0.5 %; sheared along its axis: -1.0 and -1.4 %; 2.7 and 0.5 %; 1.2 and -0.2 %.
-const PRESSED: f64 = 6.0;
-const SHEARED: f64 = 1.6;
+/// Stiffness of the bedding by which a surface between grid planes is held, in moduli per cell. It gives way like a layer of a
+/// fiftieth of a cell; much stiffer, the displacements of a cell that a curved surface passes through could hardly change across
+/// it. Errors of the compliance of a ring held at its bore, 4 and 8 cells to the radius (`tests/elasticity.rs`), pressed: with 10,
+/// 2.2 and 1.3 %; 20, 0.9 and 0.7 %; 30, 0.5 and 0.5 %; 50, 0.1 and 0.3 %; 100, -0.2 and 0.1 %; sheared along its axis: 1.0 and
+/// 0.6 %; 0.2 and 0.2 %; 0.0 and 0.1 %; -0.3 and 0.0 %; -0.5 and -0.2 %.
+const BEDDING: f64 = 50.0;
+
+/// A node in a plane support is fixed if so much of its share of the surface is held. An edge of the support that passes
+/// midway between two nodes covers a quarter of the share of the outer one.
+const COVERED: f64 = 0.25;
 
 /// Most cells of a grid, filled or not: half a gigabyte for their fractions.
 const MOST_CELLS: u64 = 1 << 27;
@@ -33,9 +41,17 @@ pub struct Body {
     pub grid: Grid,
     /// From 0 to 1, by the number of the cell in the grid.
     pub fraction: Vec<f32>,
+    /// Where the material is in cells that are filled in part. A cell that is not among them counts as one of softer material.
+    pub cuts: Cuts,
 }
 
 impl Body {
+    /// What a closed mesh fills of a grid. Its faces must look outwards.
+    pub fn new(mesh: &TriangleMesh, grid: Grid) -> Self {
+        let fraction = fractions(mesh, &grid);
+        Self { cuts: Cuts::new(mesh, &grid, &fraction), fraction, grid }
+    }
+
     /// Volume of the material, mm^3.
     pub fn volume(&self) -> f64 {
         self.fraction.iter().map(|&f| f64::from(f)).sum::<f64>() * self.grid.size.powi(3)
@@ -66,11 +82,12 @@ pub struct Model {
     /// Young's modulus, MPa.
     pub young: f64,
     pub(crate) element: Hexahedron,
+    pub(crate) cuts: CutCells,
     pub(crate) hierarchy: Hierarchy,
     /// Unknowns that are fixed, sorted.
     pub(crate) fixed: Vec<u32>,
-    /// Unknowns on springs, N/mm, sorted.
-    pub(crate) springs: Vec<(u32, f64)>,
+    /// Cells whose surface is held between the planes of the grid.
+    pub(crate) beddings: Vec<Bedding>,
     pub(crate) particular: Particular,
     /// Forces on the unknowns, N, one vector per load case.
     pub(crate) forces: Vec<Vec<f64>>,
@@ -137,6 +154,7 @@ impl Model {
         let lattice = Lattice::new(grid.cells, &active);
         let fraction =
             lattice.cell_places().map(|place| f64::from(body.fraction[grid.index(place)])).collect();
+        let cuts = CutCells::new(&lattice, &body.cuts, |place| grid.index(place), poisson);
         let mut model = Self {
             hierarchy: Hierarchy::new(&lattice),
             grid,
@@ -145,8 +163,9 @@ impl Model {
             islands,
             young,
             element: Hexahedron::new(poisson),
+            cuts,
             fixed: Vec::new(),
-            springs: Vec::new(),
+            beddings: Vec::new(),
             particular: Particular::default(),
             forces: Vec::new(),
         };
@@ -155,59 +174,60 @@ impl Model {
         Ok(model)
     }
 
-    /// Spreads the area of each point over the nodes of its cell, and fixes nodes or puts them on springs.
+    /// Fixes the nodes of supports in planes of the grid, and puts the cells of all others on a bedding.
     fn hold(&mut self, supports: &[(Vec<Option<Attached>>, [bool; 3])], attachment: &Attachment) {
         let n = self.lattice.node_count as u32;
-        let mut fixed = Vec::new();
-        let mut beddings: BTreeMap<u32, f64> = BTreeMap::new();
+        // By unknown, of supports in planes: area that is held and area that there is.
+        let mut planes: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
+        let mut beddings: BTreeMap<u32, Bedding> = BTreeMap::new();
         for ((points, directions), (surface, _)) in supports.iter().zip(&attachment.supports) {
+            let held = || (0..3).filter(|&d| directions[d]);
+            let mut seen = BTreeSet::new();
             for (at, surface) in points.iter().zip(surface) {
                 let Some((at, corners)) = at.as_ref().and_then(|a| Some((a, self.lattice.corners(a.cell)?)))
                 else {
                     continue;
                 };
-                for (corner, weight) in at.weights().into_iter().enumerate() {
-                    for d in (0..3).filter(|&d| directions[d] && weight > 1e-9) {
-                        let unknown = d as u32 * n + corners[corner];
-                        if at.on_plane {
-                            fixed.push(unknown);
-                        } else {
-                            // Pressing and shearing; what couples the axes at slanted walls is left out.
-                            let across = surface.normal[d] * surface.normal[d];
-                            let bedding = PRESSED * across + SHEARED * (1.0 - across);
-                            *beddings.entry(unknown).or_default() += bedding * weight * surface.area;
+                let Some(cell) = self.lattice.cell(at.cell) else { continue };
+                let weights = at.weights();
+                if let Some(axis) = at.plane {
+                    let first = seen.insert((cell, axis));
+                    let side = usize::from(at.local[axis] > 0.5);
+                    let whole = 0.25 * self.fraction[cell as usize] * self.grid.size * self.grid.size;
+                    for corner in (0..8).filter(|c| c >> axis & 1 == side) {
+                        for d in held() {
+                            let [covered, there] = planes.entry(d as u32 * n + corners[corner]).or_default();
+                            *covered += weights[corner] * surface.area;
+                            *there += if first { whole } else { 0.0 };
+                        }
+                    }
+                } else {
+                    let none = || Bedding { nodes: corners, stiffness: [[0.0; 64]; 3] };
+                    let bedding = beddings.entry(cell).or_insert_with(none);
+                    let stiffness = BEDDING * self.young / self.grid.size * surface.area;
+                    for d in held() {
+                        for (k, to) in bedding.stiffness[d].iter_mut().enumerate() {
+                            *to += stiffness * weights[k / 8] * weights[k % 8];
                         }
                     }
                 }
             }
         }
-        fixed.sort_unstable();
-        fixed.dedup();
-        let stiffness = self.young / self.grid.size;
-        self.springs = beddings
-            .into_iter()
-            .filter(|(unknown, _)| fixed.binary_search(unknown).is_err())
-            .map(|(unknown, bedding)| (unknown, stiffness * bedding))
-            .collect();
-        self.fixed = fixed;
-        // The cells of these unknowns; a spring belongs to one of them.
-        let mut taken = vec![false; self.springs.len()];
+        let covered = planes.into_iter().filter(|(_, [covered, there])| *covered >= COVERED * there);
+        self.fixed = covered.map(|(unknown, _)| unknown).collect();
         for (cell, place) in self.lattice.cell_places().enumerate() {
             let Some(corners) = self.lattice.corners(place) else { continue };
             for (corner, node) in corners.into_iter().enumerate() {
                 for d in 0..3 {
-                    let unknown = d as u32 * n + node;
-                    if self.fixed.binary_search(&unknown).is_ok() {
+                    if self.fixed.binary_search(&(d as u32 * n + node)).is_ok() {
                         self.particular.cells.entry(cell as u32).or_default().fixed.push(8 * d + corner);
-                    } else if let Ok(k) = self.springs.binary_search_by_key(&unknown, |s| s.0)
-                        && !taken[k]
-                    {
-                        taken[k] = true;
-                        let entry = self.particular.cells.entry(cell as u32).or_default();
-                        entry.springs.push((8 * d + corner, self.springs[k].1));
                     }
                 }
             }
+        }
+        for (cell, bedding) in beddings {
+            self.particular.cells.entry(cell).or_default().bedding = Some(self.beddings.len());
+            self.beddings.push(bedding);
         }
     }
 
@@ -232,9 +252,13 @@ impl Model {
         }
     }
 
-    /// Stiffness of each cell for its modulus over that of the material: `young * size * factor`.
-    pub(crate) fn scale(&self, factor: impl Fn(usize) -> f64) -> Vec<f64> {
-        (0..self.lattice.cell_count).map(|cell| self.young * self.grid.size * factor(cell)).collect()
+    /// Factor of the stiffness of each cell for the modulus of its material over that of the model.
+    pub(crate) fn scale(&self, modulus: impl Fn(usize) -> f64) -> Vec<f64> {
+        let of = |cell: usize| self.young * self.grid.size * modulus(cell);
+        let mut scale: Vec<f64> =
+            (0..self.lattice.cell_count).map(|cell| self.fraction[cell] * of(cell)).collect();
+        self.cuts.cells.iter().for_each(|&cell| scale[cell as usize] = of(cell as usize));
+        scale
     }
 
     /// The nodes of a cell.
@@ -249,8 +273,8 @@ struct Attached {
     cell: [usize; 3],
     /// In the cell, 0 to 1.
     local: DVec3,
-    /// The surface lies in a plane of the grid.
-    on_plane: bool,
+    /// The axis across which the surface lies in a plane of the grid.
+    plane: Option<usize>,
     point: DVec3,
 }
 
@@ -266,6 +290,8 @@ impl Attached {
 /// Finds the cell: the first one inwards with enough material, else the best one within a cell's length.
 fn attach(body: &Body, surface: &SurfacePoint) -> Option<Attached> {
     let grid = &body.grid;
+    // Where the material is in a cell is known or not.
+    let firm = if body.cuts.cells.is_empty() { FIRM } else { LEAST_FRACTION };
     let mut best: Option<(f32, [usize; 3])> = None;
     for depth in [0.01, 0.25, 0.5, 0.75, 1.0] {
         let Some(cell) = grid.cell_at(surface.point - surface.normal * (depth * grid.size)) else { continue };
@@ -273,7 +299,7 @@ fn attach(body: &Body, surface: &SurfacePoint) -> Option<Attached> {
         if fraction >= LEAST_FRACTION && best.is_none_or(|(f, _)| fraction > f) {
             best = Some((fraction, cell));
         }
-        if fraction >= FIRM {
+        if fraction >= firm {
             break;
         }
     }
@@ -286,7 +312,7 @@ fn attach(body: &Body, surface: &SurfacePoint) -> Option<Attached> {
     if on_plane {
         local[axis] = local[axis].round();
     }
-    Some(Attached { cell, local, on_plane, point: surface.point })
+    Some(Attached { cell, local, plane: on_plane.then_some(axis), point: surface.point })
 }
 
 /// Cells joined through faces.

@@ -31,7 +31,7 @@ impl Solution {
 }
 
 impl Model {
-    /// Solves for all load cases. `modulus` is that of each cell over the material's; displacements of a former solution
+    /// Solves for all load cases. `modulus` is that of the material in each cell over [`Model::young`]; displacements of a former solution
     /// are where the search begins. The relative error of the compliance is about the square of `tolerance`.
     pub fn solve_with(
         &self,
@@ -44,15 +44,16 @@ impl Model {
         let multigrid = Multigrid::new(
             &self.hierarchy,
             &self.element,
+            &self.cuts,
             &scale,
             &self.particular,
             &self.fixed,
-            &self.springs,
+            &self.beddings,
         );
-        let operator = Operator::new(&self.lattice, &self.element, scale);
+        let operator = Operator::new(&self.lattice, &self.element, &self.cuts, &scale);
         let product = |x: &[f64], y: &mut [f64]| {
             operator.apply(&self.lattice, x, y);
-            self.springs.iter().for_each(|&(i, spring)| y[i as usize] += spring * x[i as usize]);
+            self.beddings.iter().for_each(|b| b.add_product(self.lattice.node_count, x, y));
             self.fixed.iter().for_each(|&i| y[i as usize] = 0.0);
         };
         let mut solution =
@@ -80,20 +81,23 @@ impl Model {
         Ok(solution)
     }
 
-    /// Solves for all load cases with the share of material in each cell as its modulus.
+    /// Solves for all load cases.
     pub fn solve(&self, tolerance: f64, progress: &Progress) -> Result<Solution, FemError> {
-        self.solve_with(|cell| self.fraction[cell], None, tolerance, progress)
+        self.solve_with(|_| 1.0, None, tolerance, progress)
     }
 
     /// Per cell and load case `u^T K u` for the material's modulus, N mm: the derivative of the compliance by the modulus
     /// of the cell, but for its sign.
     pub fn cell_energies(&self, solution: &Solution) -> Vec<f64> {
         let scale = self.young * self.grid.size;
-        self.by_cell(|corners, _| {
+        self.by_cell(|corners, cell| {
+            let of_cut = self.cuts.find(cell as u32).map(|cut| self.cuts.matrix(cut));
+            let matrix = of_cut.as_ref().unwrap_or(&self.element.stiffness);
+            let scale = if of_cut.is_some() { scale } else { scale * self.fraction[cell] };
             let mut sum = 0.0;
             for u in &solution.displacements {
                 let local = self.local(u, corners);
-                for (a, row) in self.element.stiffness.iter().enumerate() {
+                for (a, row) in matrix.iter().enumerate() {
                     let product: f64 = row.iter().zip(&local).map(|(k, u)| k * u).sum();
                     sum += local[a] * product;
                 }

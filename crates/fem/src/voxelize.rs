@@ -13,7 +13,7 @@ use topipe_mesh::{FaceId, TriangleMesh};
 /// Where the lines pass through a cell: two patterns of nine, one the mirror image of the other, in each of which all nine
 /// have different places along both axes. So a plane wall across the lines of another axis is met to a ninth of a cell, and
 /// not, as by three rows of three, to a third; it is placed to 0.04 cells at the worst.
-fn lines() -> [[f64; 2]; 18] {
+pub(crate) fn lines() -> [[f64; 2]; 18] {
     std::array::from_fn(|k| {
         let (i, j) = (k / 3 % 3, k % 3);
         let at = [(3 * i + j) as f64 + 0.5, (3 * j + i) as f64 + 0.5].map(|x| x / 9.0);
@@ -38,6 +38,7 @@ pub fn fractions(mesh: &TriangleMesh, grid: &Grid) -> Vec<f32> {
             for &face in &lists[at] {
                 let corners = mesh.triangles[face as usize].map(|v| scaled[v.index()]);
                 crossings(corners, [axis, across, slab], at, width, |line, along, sign| {
+                    let line = line / lines().len();
                     let along = along.clamp(0.0, length as f64);
                     let cell = (along as usize).min(length - 1);
                     covered[line * length + cell] += sign * ((cell + 1) as f64 - along);
@@ -91,7 +92,12 @@ pub fn fractions(mesh: &TriangleMesh, grid: &Grid) -> Vec<f32> {
 }
 
 /// The faces that reach into each plane of cells, in their order.
-fn triangles_by_slab(mesh: &TriangleMesh, scaled: &[DVec3], axis: usize, slabs: usize) -> Vec<Vec<u32>> {
+pub(crate) fn triangles_by_slab(
+    mesh: &TriangleMesh,
+    scaled: &[DVec3],
+    axis: usize,
+    slabs: usize,
+) -> Vec<Vec<u32>> {
     let mut lists = vec![Vec::new(); slabs];
     for face in mesh.faces() {
         let FaceId(number) = face;
@@ -107,8 +113,9 @@ fn triangles_by_slab(mesh: &TriangleMesh, scaled: &[DVec3], axis: usize, slabs: 
     lists
 }
 
-/// Calls `found(cell across, coordinate along, +1 entering or -1 leaving)` for each line of a slab that crosses a triangle.
-fn crossings(
+/// Calls `found(line, coordinate along, +1 entering or -1 leaving)` for each line of a slab that crosses a triangle. Lines are
+/// numbered cell by cell across, in the order of [`lines`].
+pub(crate) fn crossings(
     corners: [DVec3; 3],
     [axis, across, slab]: [usize; 3],
     at: usize,
@@ -129,7 +136,7 @@ fn crossings(
     }
     let [bottom, top] = [f64::min, f64::max].map(|pick| flat.iter().map(|p| p.y).reduce(pick).unwrap_or(0.0));
     for cell in low as usize..=high as usize {
-        for [u, v] in lines() {
+        for (k, [u, v]) in lines().into_iter().enumerate() {
             let p = Coord { x: cell as f64 + u, y: at as f64 + v };
             if p.y < bottom || p.y > top {
                 continue;
@@ -140,7 +147,7 @@ fn crossings(
             }
             let weights = [0, 1, 2].map(|k| orient2d(flat[(k + 1) % 3], flat[(k + 2) % 3], p) / area);
             let along = (0..3).map(|k| weights[k] * corners[k][axis]).sum();
-            found(cell, along, sign);
+            found(cell * lines().len() + k, along, sign);
         }
     }
 }
@@ -162,30 +169,9 @@ fn side(p: Coord<f64>, q: Coord<f64>, x: Coord<f64>) -> bool {
 mod tests {
     use super::*;
 
-    pub(crate) fn cuboid(low: DVec3, high: DVec3) -> TriangleMesh {
-        let corner = |k: usize| [0, 1, 2].map(|d| if k >> d & 1 == 1 { high[d] } else { low[d] });
-        TriangleMesh::from_arrays(
-            (0..8).map(corner).collect(),
-            vec![
-                [0, 2, 1],
-                [1, 2, 3],
-                [4, 5, 6],
-                [5, 7, 6],
-                [0, 1, 4],
-                [1, 5, 4],
-                [2, 6, 3],
-                [3, 6, 7],
-                [0, 4, 2],
-                [2, 4, 6],
-                [1, 3, 5],
-                [3, 7, 5],
-            ],
-        )
-    }
-
     #[test]
     fn a_cuboid_fills_what_it_fills() {
-        let mesh = cuboid(DVec3::new(0.25, 1.0, 0.0), DVec3::new(3.0, 2.5, 2.0));
+        let mesh = TriangleMesh::cuboid(DVec3::new(0.25, 1.0, 0.0), DVec3::new(3.0, 2.5, 2.0));
         let grid = Grid { origin: DVec3::ZERO, size: 0.5, cells: [7, 6, 5] };
         let f = fractions(&mesh, &grid);
         let sum: f64 = f.iter().map(|&f| f64::from(f)).sum();

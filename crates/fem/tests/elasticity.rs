@@ -3,9 +3,7 @@
 mod common;
 
 use common::{cuboid, held, pulled, slab, solve, tube};
-use topipe_fem::{
-    Attachment, Body, Grid, Load, LoadCase, Model, Region, Selectors, Support, SurfacePoint, fractions,
-};
+use topipe_fem::{Attachment, Body, Grid, Load, LoadCase, Model, Region, Selectors, Support, SurfacePoint};
 use topipe_mesh::{DVec3, TriangleMesh};
 use topipe_progress::Progress;
 
@@ -28,7 +26,7 @@ fn patch_test() {
     attachment.loads.push((points, vec![DVec3::Z; 24], 0));
     attachment.cases = 1;
     let grid = Grid::around(DVec3::ZERO, DVec3::new(3.0, 2.0, 2.5), 0.5, 0);
-    let body = Body { grid, fraction: fractions(&mesh, &grid) };
+    let body = Body::new(&mesh, grid);
     let model = Model::new(&body, &attachment, 200.0, 0.3).unwrap();
     let solution = model.solve(1e-9, &Progress::silent()).unwrap();
     let strain = 4.0 / 200.0;
@@ -73,8 +71,8 @@ fn cantilevers_converge_to_the_beam_with_second_order() {
     assert!(errors[0] / errors[1] > 3.0, "{errors:?}");
 }
 
-/// Round bars: cells filled in part make a bar too stiff in bending by about (cell / radius)^2 / 2, as their material counts
-/// all over the cell.
+/// Round bars: of cells filled in part only the material counts. Spread over the cells it would make them too stiff in bending
+/// by about (cell / radius)^2 / 2: 12, 3 and 1 %.
 #[test]
 fn round_cantilevers_converge_with_second_order() {
     let (r, length) = (2.0, 30.0);
@@ -84,7 +82,7 @@ fn round_cantilevers_converge_with_second_order() {
     let exact = length.powi(3) / (3.0 * 1000.0 * inertia) + length / (6.0 / 7.0 * 500.0 * area);
     let errors = [1.0, 0.5, 0.25].map(|size| cantilever(&round, length, size, 0.0) / exact - 1.0);
     println!("round {errors:?}");
-    assert!(errors[0].abs() < 0.12 && errors[1].abs() < 0.031 && errors[2].abs() < 0.01, "{errors:?}");
+    assert!(errors[0].abs() < 0.05 && errors[1].abs() < 0.003 && errors[2].abs() < 0.002, "{errors:?}");
 }
 
 /// Plane stress in a ring that is held at its bore and pressed together at its outer wall (Lame). Both walls lie between the
@@ -118,7 +116,7 @@ fn a_ring_held_at_its_bore_shrinks_as_it_should() {
     let errors =
         [1.0, 0.5, 0.25].map(|size| solve(&ring, size, &load_case).unwrap().1.compliance() / exact - 1.0);
     println!("ring {errors:?}");
-    assert!(errors[0].abs() < 0.03 && errors[1].abs() < 0.01 && errors[2].abs() < 0.01, "{errors:?}");
+    assert!(errors.iter().all(|e| e.abs() < 0.005), "{errors:?}");
 }
 
 /// The same ring with its outer wall pushed along the axis, its plane faces held across it: shear alone.
@@ -146,5 +144,5 @@ fn a_ring_pushed_along_its_axis_shears_as_it_should() {
     let exact = 1600.0 * (b / a).ln() / (std::f64::consts::TAU * shear * height);
     let errors = [1.0, 0.5].map(|size| solve(&ring, size, &load_case).unwrap().1.compliance() / exact - 1.0);
     println!("shear {errors:?}");
-    assert!(errors[0].abs() < 0.03 && errors[1].abs() < 0.01, "{errors:?}");
+    assert!(errors.iter().all(|e| e.abs() < 0.005), "{errors:?}");
 }

@@ -25,6 +25,15 @@ impl TriangleMesh {
         }
     }
 
+    /// The surface of an axis-aligned cuboid, two triangles a side, its faces outwards where `low < high`.
+    pub fn cuboid(low: DVec3, high: DVec3) -> Self {
+        let corner = |k: usize| [0, 1, 2].map(|d| if k >> d & 1 == 1 { high[d] } else { low[d] });
+        // Corners by the bits x, y, z; each side once around as seen from outside.
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Self::from_arrays((0..8).map(corner).collect(), triangles)
+    }
+
     /// Number of vertices.
     #[inline]
     pub fn vertex_count(&self) -> usize {

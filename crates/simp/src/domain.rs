@@ -3,7 +3,7 @@
 use crate::Shape;
 use crate::shape::Face;
 use rayon::prelude::*;
-use topipe_fem::{Grid, Selector, Surface, SurfacePoint};
+use topipe_fem::{Body, Cuts, Grid, Moments, Selector, Surface, SurfacePoint, moments_of_points};
 use topipe_mesh::DVec3;
 
 /// Points per axis at which a cell at the border of the domain is looked at.
@@ -49,25 +49,35 @@ impl Domain {
         best
     }
 
-    /// Share of each cell of the grid that lies in the domain.
-    pub(crate) fn fractions(&self, grid: &Grid) -> Vec<f32> {
+    /// What of each cell of the grid lies in the domain.
+    pub(crate) fn body(&self, grid: Grid) -> Body {
         let of_cell = |index: usize| {
             let middle = grid.middle(grid.place(index));
             let distance = self.outside(middle).0;
             // Half of a cell's diagonal.
             let reach = 0.8661 * grid.size;
             if distance.abs() > reach {
-                return if distance < 0.0 { 1.0 } else { 0.0 };
+                return (if distance < 0.0 { 1.0 } else { 0.0 }, None);
             }
-            let mut inside = 0;
-            for k in 0..SAMPLES.pow(3) {
+            let at = |k: usize| {
                 let at = [k % SAMPLES, k / SAMPLES % SAMPLES, k / SAMPLES / SAMPLES];
-                let at = DVec3::from_array(at.map(|i| (i as f64 + 0.5) / SAMPLES as f64 - 0.5));
-                inside += usize::from(self.outside(middle + at * grid.size).0 < 0.0);
-            }
-            inside as f32 / SAMPLES.pow(3) as f32
+                DVec3::from_array(at.map(|i| (2 * i + 1) as f64 / SAMPLES as f64 - 1.0))
+            };
+            let is_inside = |p: &DVec3| self.outside(middle + 0.5 * grid.size * *p).0 < 0.0;
+            let inside: Vec<DVec3> = (0..SAMPLES.pow(3)).map(at).filter(is_inside).collect();
+            let fraction = inside.len() as f32 / SAMPLES.pow(3) as f32;
+            let is_cut = !inside.is_empty() && inside.len() < SAMPLES.pow(3);
+            (fraction, is_cut.then(|| moments_of_points(inside, 1.0 / SAMPLES.pow(3) as f64)))
         };
-        (0..grid.count()).into_par_iter().map(of_cell).collect()
+        let cells: Vec<(f32, Option<Moments>)> = (0..grid.count()).into_par_iter().map(of_cell).collect();
+        let mut cuts = Cuts::default();
+        for (cell, (_, moments)) in cells.iter().enumerate() {
+            if let Some(moments) = moments {
+                cuts.cells.push(cell as u32);
+                cuts.moments.push(*moments);
+            }
+        }
+        Body { grid, fraction: cells.into_iter().map(|c| c.0).collect(), cuts }
     }
 }
 
@@ -138,7 +148,7 @@ mod tests {
             non_design: vec![],
         };
         let grid = Grid::around(DVec3::ZERO, DVec3::new(12.0, 10.0, 2.0), 0.5, 0);
-        let volume: f64 = domain.fractions(&grid).iter().map(|&f| f64::from(f)).sum::<f64>() * 0.125;
+        let volume = domain.body(grid).volume();
         let exact = 240.0 - 2.0 * std::f64::consts::PI * 2.25;
         assert!((volume / exact - 1.0).abs() < 2e-3, "{volume} {exact}");
         let all = Selector::Box(DVec3::splat(-1.0), DVec3::splat(20.0));

@@ -3,7 +3,7 @@
 use crate::domain::Domain;
 use crate::filter::Filter;
 use crate::{FractionOf, Parameters, SimpError};
-use topipe_fem::{Attachment, Body, Grid, Model, Selectors, Surface, check_size};
+use topipe_fem::{Attachment, Grid, Model, Selectors, Surface, check_size};
 use topipe_progress::{Progress, UnitKey, Units};
 
 /// Cells of a domain for which no size is given.
@@ -53,11 +53,10 @@ impl Problem {
         });
         check_size(low, high, size)?;
         let grid = Grid::around(low, high, size, 0);
-        let fraction = domain.fractions(&grid);
         let load_case = parameters.load_case();
         let selectors = Selectors::new(&load_case, None, None, 1e-3 * size)?;
         let attachment = Attachment::new(&load_case, &domain, &selectors, "", size)?;
-        let body = Body { grid, fraction };
+        let body = domain.body(grid);
         let model = Model::new(&body, &attachment, parameters.young, parameters.poisson)?;
         let passive: Vec<bool> = model
             .lattice
@@ -134,9 +133,7 @@ impl Problem {
                 None => {
                     let density = physical(&x);
                     let (p, least) = (parameters.penalty, parameters.least_modulus);
-                    let modulus = |e: usize| {
-                        model.fraction[e] * (least + (1.0 - least) * f64::from(density[e]).powf(p))
-                    };
+                    let modulus = |e: usize| least + (1.0 - least) * f64::from(density[e]).powf(p);
                     // Not from the displacements before: a run that was interrupted does not have them, and must end with
                     // the same bytes.
                     let solved = model.solve_with(modulus, None, parameters.tolerance, progress)?;
@@ -145,7 +142,7 @@ impl Problem {
                     let mut slope: Vec<f64> = (0..n)
                         .map(|e| {
                             let density = f64::from(density[e]);
-                            -model.fraction[e] * p * (1.0 - least) * density.powf(p - 1.0) * energies[e]
+                            -p * (1.0 - least) * density.powf(p - 1.0) * energies[e]
                         })
                         .collect();
                     if let Some(filter) = &on_sensitivity {

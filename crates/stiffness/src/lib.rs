@@ -21,7 +21,7 @@ pub use figures::{Figures, Stiffness};
 pub use parameters::Parameters;
 
 use topipe_beams::Structure;
-use topipe_fem::{Attachment, Body, FemError, Grid, Model, Selectors, check_size, fractions};
+use topipe_fem::{Attachment, Body, FemError, Grid, Model, Selectors, check_size};
 use topipe_mesh::{DVec3, Part, TriangleMesh};
 use topipe_progress::Progress;
 use topipe_spline_fit::SplineSurface;
@@ -97,7 +97,7 @@ pub fn compare(
         };
         let of = if *what == "the original" { String::new() } else { format!(" on {what}") };
         let attachment = Attachment::new(&load_case, *mesh, &selectors, &of, size)?;
-        let body = Body { grid, fraction: fractions(mesh, &grid) };
+        let body = Body::new(mesh, grid);
         let model = Model::new(&body, &attachment, parameters.young, parameters.poisson)
             .map_err(|error| StiffnessError::Model { what: (*what).to_owned(), error: Box::new(error) })?;
         models.push(Some((model, attachment)));

@@ -5,6 +5,8 @@
 //! children; those of the first coarse grid come from moduli alone. They are then assembled: each node has a row of 3 x 81
 //! numbers for its 27 neighbours, stored in single precision.
 
+use super::bedding::Bedding;
+use super::cut::CutCells;
 use crate::element::{Hexahedron, UNKNOWNS};
 use crate::lattice::Lattice;
 use rayon::prelude::*;
@@ -71,18 +73,18 @@ fn unpack(packed: &[f64]) -> Matrix {
     matrix
 }
 
-/// What is particular about some cells of the finest grid: unknowns that are fixed, and springs.
+/// What is particular about some cells of the finest grid: unknowns that are fixed, and beddings.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Particular {
     /// By the number of the cell.
     pub(crate) cells: BTreeMap<u32, Held>,
 }
 
-/// Unknowns of a cell that are fixed, and springs at its unknowns.
+/// Unknowns of a cell that are fixed, and the number of its bedding.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Held {
     pub(crate) fixed: Vec<usize>,
-    pub(crate) springs: Vec<(usize, f64)>,
+    pub(crate) bedding: Option<usize>,
 }
 
 impl ElementMatrices {
@@ -91,8 +93,10 @@ impl ElementMatrices {
         fine: &Lattice,
         coarse: &Lattice,
         element: &Hexahedron,
+        cuts: &CutCells,
         scale: &[f64],
         particular: &Particular,
+        beddings: &[Bedding],
     ) -> Self {
         let projected: Vec<Vec<f64>> = (0..8)
             .map(|child| {
@@ -106,11 +110,21 @@ impl ElementMatrices {
                 let at = std::array::from_fn(|d| 2 * place[d] + (child >> d & 1));
                 let Some(cell) = fine.cell(at) else { continue };
                 let factor = scale[cell as usize];
-                match particular.cells.get(&cell) {
-                    None => packed.iter_mut().zip(projected).for_each(|(to, p)| *to += factor * p),
-                    Some(Held { fixed, springs }) => {
-                        let mut matrix = element.stiffness.map(|row| row.map(|value| factor * value));
-                        springs.iter().for_each(|&(i, spring)| matrix[i][i] += spring);
+                let cut = cuts.find(cell);
+                match (particular.cells.get(&cell), cut) {
+                    (None, None) => packed.iter_mut().zip(projected).for_each(|(to, p)| *to += factor * p),
+                    (held, cut) => {
+                        let none = Held::default();
+                        let Held { fixed, bedding } = held.unwrap_or(&none);
+                        let matrix = cut.map_or(element.stiffness, |cut| cuts.matrix(cut));
+                        let mut matrix = matrix.map(|row| row.map(|value| factor * value));
+                        if let Some(bedding) = bedding.map(|k| &beddings[k]) {
+                            for i in 0..UNKNOWNS {
+                                let row = &bedding.stiffness[i / 8][8 * (i % 8)..][..8];
+                                let own = &mut matrix[i][i / 8 * 8..][..8];
+                                own.iter_mut().zip(row).for_each(|(to, k)| *to += k);
+                            }
+                        }
                         for &i in fixed {
                             matrix[i] = [0.0; UNKNOWNS];
                             matrix.iter_mut().for_each(|row| row[i] = 0.0);

@@ -2,7 +2,9 @@
 //!
 //! All of it in single precision. Grids are coarsened by two until a direct solution is cheap.
 
+use super::bedding::Bedding;
 use super::coarse::{Assembled, ElementMatrices, Particular, neighbors};
+use super::cut::CutCells;
 use super::envelope::{Factor, Ordering};
 use super::operator::Operator;
 use super::transfer::Transfer;
@@ -51,10 +53,6 @@ impl Hierarchy {
         let neighbors = lattices[1..last].iter().map(neighbors).collect();
         Self { lattices, transfers, neighbors, ordering }
     }
-
-    pub(crate) fn finest(&self) -> &Lattice {
-        &self.lattices[0]
-    }
 }
 
 /// Neighbours of each node of a lattice.
@@ -73,13 +71,13 @@ fn graph(lattice: &Lattice) -> Vec<Vec<u32>> {
     graph
 }
 
-enum Matrix {
-    Free(Box<Operator<f32>>),
+enum Matrix<'a> {
+    Free(Box<Operator<'a, f32>>),
     Assembled(Assembled),
 }
 
-struct Level {
-    matrix: Matrix,
+struct Level<'a> {
+    matrix: Matrix<'a>,
     inverse_diagonal: Vec<f32>,
     largest: f64,
 }
@@ -88,10 +86,10 @@ struct Level {
 pub(crate) struct Multigrid<'a> {
     hierarchy: &'a Hierarchy,
     /// All but the coarsest.
-    levels: Vec<Level>,
-    /// Fixed unknowns of the finest grid, and springs.
+    levels: Vec<Level<'a>>,
+    /// Fixed unknowns of the finest grid, and beddings.
     fixed: &'a [u32],
-    springs: &'a [(u32, f64)],
+    beddings: &'a [Bedding],
     coarsest: Factor,
 }
 
@@ -99,16 +97,17 @@ impl<'a> Multigrid<'a> {
     pub(crate) fn new(
         hierarchy: &'a Hierarchy,
         element: &Hexahedron,
+        cuts: &'a CutCells,
         scale: &[f64],
         particular: &Particular,
         fixed: &'a [u32],
-        springs: &'a [(u32, f64)],
+        beddings: &'a [Bedding],
     ) -> Self {
         let lattices = &hierarchy.lattices;
         let fine = &lattices[0];
-        let operator = Operator::new(fine, element, scale.iter().map(|&s| s as f32).collect());
+        let operator = Operator::new(fine, element, cuts, scale);
         let mut diagonal = operator.diagonal(fine, element);
-        springs.iter().for_each(|&(i, spring)| diagonal[i as usize] += spring as f32);
+        beddings.iter().for_each(|b| b.add_diagonal(fine.node_count, &mut diagonal));
         fixed.iter().for_each(|&i| diagonal[i as usize] = 1.0);
         let inverse_diagonal = diagonal.iter().map(|&d| if d > 0.0 { 1.0 / d } else { 0.0 }).collect();
         let mut levels = vec![Level {
@@ -116,12 +115,18 @@ impl<'a> Multigrid<'a> {
             inverse_diagonal,
             largest: element.largest_eigenvalue(),
         }];
-        let mut elements = ElementMatrices::of_children(fine, &lattices[1], element, scale, particular);
+        if !cuts.cells.is_empty() {
+            // The bound is that of full cells.
+            let estimate = levels[0].estimate_largest(fine, fixed, beddings);
+            levels[0].largest = levels[0].largest.max(estimate);
+        }
+        let mut elements =
+            ElementMatrices::of_children(fine, &lattices[1], element, cuts, scale, particular, beddings);
         for k in 1..lattices.len() - 1 {
             let assembled = Assembled::new(&lattices[k], hierarchy.neighbors[k - 1].clone(), &elements);
             let inverse_diagonal = assembled.inverse_diagonal.clone();
             let mut level = Level { matrix: Matrix::Assembled(assembled), inverse_diagonal, largest: 1.0 };
-            level.largest = level.estimate_largest(&lattices[k]);
+            level.largest = level.estimate_largest(&lattices[k], &[], &[]);
             levels.push(level);
             elements = elements.coarser(&lattices[k], &lattices[k + 1]);
         }
@@ -135,7 +140,7 @@ impl<'a> Multigrid<'a> {
             }
         }
         let (coarsest, _) = matrix.factor();
-        Self { hierarchy, levels, fixed, springs, coarsest }
+        Self { hierarchy, levels, fixed, beddings, coarsest }
     }
 
     /// `z = M^-1 r`, linear and symmetric.
@@ -159,14 +164,7 @@ impl<'a> Multigrid<'a> {
     }
 
     fn multiply(&self, level: usize, x: &[f32], y: &mut [f32]) {
-        match &self.levels[level].matrix {
-            Matrix::Free(operator) => {
-                operator.apply(self.hierarchy.finest(), x, y);
-                self.springs.iter().for_each(|&(i, s)| y[i as usize] += s as f32 * x[i as usize]);
-                self.fixed.iter().for_each(|&i| y[i as usize] = 0.0);
-            }
-            Matrix::Assembled(matrix) => matrix.apply(x, y),
-        }
+        self.levels[level].multiply(&self.hierarchy.lattices[level], self.fixed, self.beddings, x, y);
     }
 
     fn cycle(&self, level: usize, b: Vec<f32>) -> Vec<f32> {
@@ -236,11 +234,22 @@ impl<'a> Multigrid<'a> {
     }
 }
 
-impl Level {
+impl Level<'_> {
+    /// `fixed` and `beddings` are those of the finest grid.
+    fn multiply(&self, lattice: &Lattice, fixed: &[u32], beddings: &[Bedding], x: &[f32], y: &mut [f32]) {
+        match &self.matrix {
+            Matrix::Free(operator) => {
+                operator.apply(lattice, x, y);
+                beddings.iter().for_each(|b| b.add_product(lattice.node_count, x, y));
+                fixed.iter().for_each(|&i| y[i as usize] = 0.0);
+            }
+            Matrix::Assembled(matrix) => matrix.apply(x, y),
+        }
+    }
+
     /// The largest eigenvalue of the matrix over its diagonal, by the power method, with a margin.
-    fn estimate_largest(&self, lattice: &Lattice) -> f64 {
+    fn estimate_largest(&self, lattice: &Lattice, fixed: &[u32], beddings: &[Bedding]) -> f64 {
         let n = 3 * lattice.node_count;
-        let Matrix::Assembled(matrix) = &self.matrix else { return self.largest };
         // Rough, so that the large eigenvalues are in it, and the same on every machine.
         let mut state = 0x9e37_79b9u32;
         let mut x: Vec<f32> = (0..n)
@@ -252,7 +261,7 @@ impl Level {
         let mut y = vec![0.0; n];
         let mut value = 1.0;
         for _ in 0..12 {
-            matrix.apply(&x, &mut y);
+            self.multiply(lattice, fixed, beddings, &x, &mut y);
             y.iter_mut().zip(&self.inverse_diagonal).for_each(|(y, d)| *y *= d);
             let norm = super::vector::dot32(&y, &y).sqrt();
             value = norm / super::vector::dot32(&x, &x).sqrt().max(f64::MIN_POSITIVE);

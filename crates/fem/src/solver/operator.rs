@@ -1,30 +1,37 @@
 //! The product with the stiffness matrix, from the elements, without the matrix.
 
+use super::cut::CutCells;
 use super::vector::Real;
 use crate::element::{Hexahedron, UNKNOWNS};
 use crate::lattice::{CellRun, Lattice};
 use rayon::prelude::*;
 
 /// Cells that are computed at once, one per lane.
-const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 8;
 
 /// Layers of cells are dealt out in blocks, about so many: enough for many threads, and each block costs one more plane of
 /// nodes to be added afterwards. The number must not depend on the threads, as it decides the order of sums.
 const BLOCKS: usize = 32;
 
-/// The operator `sum over cells of scale_e K`, with scale `E h` of each cell.
+/// The operator `sum over cells of scale_e K_e`, with scale `E h` of each cell. `K_e` is the same for all but the cut cells.
 #[derive(Debug, Clone)]
-pub(crate) struct Operator<T> {
+pub(crate) struct Operator<'a, T> {
     blocks: [[T; 9]; 8],
-    /// One per cell.
-    pub(crate) scale: Vec<T>,
+    /// One per cell, 0 for the cut ones.
+    scale: Vec<T>,
+    cuts: &'a CutCells,
+    /// One per cut cell.
+    cut_scale: Vec<T>,
     /// First layer of each block, and the end.
     layers: Vec<usize>,
 }
 
-impl<T: Real> Operator<T> {
-    pub(crate) fn new(lattice: &Lattice, element: &Hexahedron, scale: Vec<T>) -> Self {
-        Self { blocks: element.blocks.map(|block| block.map(T::of)), scale, layers: layer_blocks(lattice) }
+impl<'a, T: Real> Operator<'a, T> {
+    pub(crate) fn new(lattice: &Lattice, element: &Hexahedron, cuts: &'a CutCells, scale: &[f64]) -> Self {
+        let mut own: Vec<T> = scale.iter().map(|&s| T::of(s)).collect();
+        let cut_scale = cuts.cells.iter().map(|&cell| std::mem::take(&mut own[cell as usize])).collect();
+        let blocks = element.blocks.map(|block| block.map(T::of));
+        Self { blocks, scale: own, cuts, cut_scale, layers: layer_blocks(lattice) }
     }
 
     /// `y = A x`.
@@ -58,6 +65,7 @@ impl<T: Real> Operator<T> {
                     let into_halo = !last && run.at[2] as usize + 1 == z1;
                     self.add_run(run, &components, &mut own, start, into_halo.then_some(&mut halo[..]));
                 }
+                self.add_cuts(lattice.layers(z0, z1), &components, &mut own, start, &mut halo);
                 halo
             })
             .collect();
@@ -124,6 +132,49 @@ impl<T: Real> Operator<T> {
         }
     }
 
+    /// The cut cells of some runs that follow each other.
+    fn add_cuts(
+        &self,
+        runs: &[CellRun],
+        x: &[&[T]; 3],
+        own: &mut [&mut [T]; 3],
+        start: usize,
+        halo: &mut [T],
+    ) {
+        let (Some(first), Some(last)) = (runs.first(), runs.last()) else { return };
+        let place = |cell: u32| self.cuts.cells.partition_point(|&c| c < cell);
+        let (begin, end) = (place(first.first), place(last.first + last.count));
+        let (own_end, above) = (start + own[0].len(), halo.len() / 3);
+        for first in (begin..end).step_by(WIDTH) {
+            let m = WIDTH.min(end - first);
+            let rows = &self.cuts.rows[first..first + m];
+            let mut u = [[T::default(); WIDTH]; UNKNOWNS];
+            for c in 0..3 {
+                for (lane, rows) in rows.iter().enumerate() {
+                    for (r, &row) in rows.iter().enumerate() {
+                        u[8 * c + 2 * r][lane] = x[c][row as usize];
+                        u[8 * c + 2 * r + 1][lane] = x[c][row as usize + 1];
+                    }
+                }
+            }
+            self.cuts.multiply(first, &self.cut_scale[first..first + m], &mut u);
+            for c in 0..3 {
+                for (lane, rows) in rows.iter().enumerate() {
+                    for (r, &row) in rows.iter().enumerate() {
+                        let row = row as usize;
+                        let target = if row < own_end {
+                            &mut own[c][row - start..row - start + 2]
+                        } else {
+                            &mut halo[c * above + row - own_end..][..2]
+                        };
+                        target[0] += u[8 * c + 2 * r][lane];
+                        target[1] += u[8 * c + 2 * r + 1][lane];
+                    }
+                }
+            }
+        }
+    }
+
     /// The diagonal of the matrix.
     pub(crate) fn diagonal(&self, lattice: &Lattice, element: &Hexahedron) -> Vec<T> {
         let n = lattice.node_count;
@@ -140,6 +191,13 @@ impl<T: Real> Operator<T> {
                 }
             }
         }
+        for (cut, rows) in self.cuts.rows.iter().enumerate() {
+            let matrix = self.cuts.matrix(cut);
+            for i in 0..UNKNOWNS {
+                let node = rows[i % 8 / 2] as usize + (i & 1);
+                diagonal[i / 8 * n + node] += self.cut_scale[cut] * T::of(matrix[i][i]);
+            }
+        }
         diagonal
     }
 }
@@ -147,6 +205,24 @@ impl<T: Real> Operator<T> {
 /// `u = scale K u` for a row of cells.
 #[inline(always)]
 fn multiply<T: Real>(blocks: &[[T; 9]; 8], scale: &[T; WIDTH], u: &mut [[T; WIDTH]; UNKNOWNS]) {
+    to_walsh(u);
+    for p in 0..8 {
+        let at = [p ^ 1, 8 + (p ^ 2), 16 + (p ^ 4)];
+        let v = at.map(|i| u[i]);
+        let b = &blocks[p];
+        for row in 0..3 {
+            for k in 0..WIDTH {
+                u[at[row]][k] =
+                    scale[k] * (b[3 * row] * v[0][k] + b[3 * row + 1] * v[1][k] + b[3 * row + 2] * v[2][k]);
+            }
+        }
+    }
+    from_walsh(u);
+}
+
+/// Sums and differences along the axes: coefficients of the Walsh functions, times 8.
+#[inline(always)]
+pub(crate) fn to_walsh<T: Real>(u: &mut [[T; WIDTH]; UNKNOWNS]) {
     for c in 0..3 {
         for bit in [1, 2, 4] {
             for n in 0..8 {
@@ -160,17 +236,11 @@ fn multiply<T: Real>(blocks: &[[T; 9]; 8], scale: &[T; WIDTH], u: &mut [[T; WIDT
             }
         }
     }
-    for p in 0..8 {
-        let at = [p ^ 1, 8 + (p ^ 2), 16 + (p ^ 4)];
-        let v = at.map(|i| u[i]);
-        let b = &blocks[p];
-        for row in 0..3 {
-            for k in 0..WIDTH {
-                u[at[row]][k] =
-                    scale[k] * (b[3 * row] * v[0][k] + b[3 * row + 1] * v[1][k] + b[3 * row + 2] * v[2][k]);
-            }
-        }
-    }
+}
+
+/// The transpose.
+#[inline(always)]
+pub(crate) fn from_walsh<T: Real>(u: &mut [[T; WIDTH]; UNKNOWNS]) {
     for c in 0..3 {
         for bit in [1, 2, 4] {
             for n in 0..8 {
@@ -206,6 +276,7 @@ fn layer_blocks(lattice: &Lattice) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::moments::Cuts;
 
     /// The operator is the sum of element matrices, whatever the gaps between the cells.
     #[test]
@@ -215,7 +286,13 @@ mod tests {
         let lattice = Lattice::new(cells, &active);
         let element = Hexahedron::new(0.31);
         let scale: Vec<f64> = (0..lattice.cell_count).map(|k| 0.1 + (k % 7) as f64).collect();
-        let operator = Operator::new(&lattice, &element, scale.clone());
+        // Every third cell is cut.
+        let cut: Vec<u32> = (0..260).filter(|k| k % 3 == 0).collect();
+        let of = |k: u32| std::array::from_fn(|m| 1.0 / (1.0 + (m as u32 * 7 + k) as f32 % 11.0));
+        let cuts = Cuts { moments: cut.iter().map(|&k| of(k)).collect(), cells: cut };
+        let cuts = CutCells::new(&lattice, &cuts, |[x, y, z]| x + 13 * (y + 4 * z), 0.31);
+        assert!(cuts.cells.len() > 40);
+        let operator = Operator::new(&lattice, &element, &cuts, &scale);
         let n = lattice.node_count;
         let x: Vec<f64> = (0..3 * n).map(|k| ((k * 37) % 101) as f64 / 50.0 - 1.0).collect();
         let mut y = vec![f64::NAN; 3 * n];
@@ -224,9 +301,10 @@ mod tests {
         for (k, place) in lattice.cell_places().enumerate() {
             let corners = lattice.corners(place).unwrap();
             let unknown = |i: usize| (i / 8) * n + corners[i % 8] as usize;
+            let matrix = cuts.find(k as u32).map_or(element.stiffness, |cut| cuts.matrix(cut));
             for a in 0..UNKNOWNS {
                 for b in 0..UNKNOWNS {
-                    expected[unknown(a)] += scale[k] * element.stiffness[a][b] * x[unknown(b)];
+                    expected[unknown(a)] += scale[k] * matrix[a][b] * x[unknown(b)];
                 }
             }
         }

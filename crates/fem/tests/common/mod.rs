@@ -2,30 +2,13 @@
 #![allow(dead_code, unreachable_pub)] // each test takes what it needs
 
 use topipe_fem::{
-    Attachment, Body, FemError, Grid, Load, LoadCase, Model, Region, Selectors, Solution, Support, fractions,
+    Attachment, Body, FemError, Grid, Load, LoadCase, Model, Region, Selectors, Solution, Support,
 };
 use topipe_mesh::TriangleMesh;
 use topipe_progress::Progress;
 
 pub fn cuboid(low: [f64; 3], high: [f64; 3]) -> TriangleMesh {
-    let corner = |k: usize| [0, 1, 2].map(|d| if k >> d & 1 == 1 { high[d] } else { low[d] });
-    TriangleMesh::from_arrays(
-        (0..8).map(corner).collect(),
-        vec![
-            [0, 2, 1],
-            [1, 2, 3],
-            [4, 5, 6],
-            [5, 7, 6],
-            [0, 1, 4],
-            [1, 5, 4],
-            [2, 6, 3],
-            [3, 6, 7],
-            [0, 4, 2],
-            [2, 4, 6],
-            [1, 3, 5],
-            [3, 7, 5],
-        ],
-    )
+    TriangleMesh::cuboid(low.into(), high.into())
 }
 
 /// A closed tube or bar along z: rings of `n` points at these radii, outside and (if not 0) inside.
@@ -69,7 +52,7 @@ pub fn solve(mesh: &TriangleMesh, size: f64, load_case: &LoadCase) -> Result<(Mo
     load_case.check_complete()?;
     let (low, high) = mesh.bounds();
     let grid = Grid::around(low, high, size, 0);
-    let body = Body { grid, fraction: fractions(mesh, &grid) };
+    let body = Body::new(mesh, grid);
     let selectors = Selectors::new(load_case, None, None, 1e-6 * mesh.diagonal())?;
     let attachment = Attachment::new(load_case, mesh, &selectors, "", size)?;
     let model = Model::new(&body, &attachment, load_case.young, load_case.poisson)?;
