@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Stage, its crate, and the file of its adapter in `stages` and of its writers in `export`. Pictures, exchange formats and
 /// the report are no stages, they
 /// have a writer only.
-const PARTS: [(&str, &str, &str); 14] = [
+const PARTS: [(&str, &str, &str); 15] = [
     ("IMPORT", "mesh", "import.rs"),
     ("SIMP", "simp", "simp.rs"),
     ("SMOOTHING", "smoothing", "smoothing.rs"),
@@ -21,6 +21,7 @@ const PARTS: [(&str, &str, &str); 14] = [
     ("SPLINE_FIT", "spline-fit", "spline_fit.rs"),
     ("SKELETON", "skeleton", "skeleton.rs"),
     ("BEAMS", "beams", "beams.rs"),
+    ("SIZING", "stiffness", "sizing.rs"),
     ("STIFFNESS", "stiffness", "stiffness.rs"),
     ("VALIDATION", "validation", "validation.rs"),
     ("PICTURE", "render", "picture.rs"),

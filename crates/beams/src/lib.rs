@@ -56,29 +56,31 @@ pub fn frame(
     progress.check()?;
     let Pieces { mut nodes, beams, links, remarks } = pieces;
     if parameters.axis == AxisForm::Straight {
-        let held: Vec<_> = nodes
-            .iter()
-            .map(|n| fit::Held {
-                position: n.position,
-                // A joint is where its axes meet; an interface lies in the plane where the design ends and counts as
-                // one more point of its beams; the rest only must not slide along its axis.
-                hold: match n.kind {
-                    NodeKind::NonDesign => 1e6,
-                    NodeKind::Interface => 1.0,
-                    NodeKind::Junction | NodeKind::Bend | NodeKind::End => 1e-3,
-                },
-            })
-            .collect();
         let lines: Vec<_> = (beams.iter())
             .map(|b| fit::Line { ends: b.ends.map(|n| n as usize), points: b.points.clone() })
             .collect();
-        for (node, position) in nodes.iter_mut().zip(fit::nodes(&held, &lines)) {
+        let reach: Vec<f64> = (0..nodes.len() as u32)
+            .map(|v| {
+                beams.iter().filter(|b| b.ends.contains(&v)).map(|b| b.section.radius()).fold(0.0, f64::max)
+            })
+            .collect();
+        let held = nodes.iter().zip(&reach).map(|(n, &reach)| {
+            // A joint is where its axes meet; an interface lies in the plane where the design ends and counts as
+            // one more point of its beams; the rest only must not slide along its axis.
+            let hold = match n.kind {
+                NodeKind::NonDesign => 1e6,
+                NodeKind::Interface => 1.0,
+                NodeKind::Junction | NodeKind::Bend | NodeKind::End => 1e-3,
+            };
+            fit::Held { position: n.position, hold, reach }
+        });
+        let held: Vec<_> = held.collect();
+        for (node, position) in nodes.iter_mut().zip(fit::nodes_within_reach(held, &lines)) {
             node.position = position;
         }
     }
     progress.check()?;
-    let mut table = if parameters.standard_profiles { table::standard() } else { Vec::new() };
-    table.extend(parameters.profiles.iter().cloned());
+    let table = parameters.table();
     let mut structure = Structure {
         nodes,
         beams: Vec::with_capacity(beams.len()),

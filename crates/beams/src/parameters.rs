@@ -97,6 +97,13 @@ impl Default for Parameters {
 }
 
 impl Parameters {
+    /// The profiles to choose from.
+    pub fn table(&self) -> Vec<Profile> {
+        let mut table = if self.standard_profiles { crate::table::standard() } else { Vec::new() };
+        table.extend(self.profiles.iter().cloned());
+        table
+    }
+
     pub(crate) fn check(&self) -> Result<(), BeamError> {
         let within = |name, value: f64, low: f64, high: f64, range| {
             if value >= low && value <= high {

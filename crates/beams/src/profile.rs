@@ -172,29 +172,30 @@ pub struct Choice {
     pub error: f64,
 }
 
-/// The profile of the smallest error; of equals the first. `None` for an empty table or a section of no area.
-pub(crate) fn choose(section: &MeanSection, table: &[Profile], weights: [f64; 4]) -> Option<Choice> {
-    let wanted = [section.area, section.moments[0], section.moments[1], section.torsion];
-    // A property that is not known (the torsion of an old artifact) does not count.
-    let total: f64 = wanted.iter().zip(weights).filter(|(x, _)| **x > 0.0).map(|(_, w)| w).sum();
-    if section.area <= 0.0 || total <= 0.0 {
-        return None;
-    }
-    let error = |profile: &Profile| {
+impl Choice {
+    /// This profile for that section, whether it is the nearest or not. `weights` are those of the parameters.
+    pub fn of(profile: &Profile, section: &MeanSection, weights: [f64; 4]) -> Self {
+        let wanted = [section.area, section.moments[0], section.moments[1], section.torsion];
         let Properties { area, moments, torsion } = profile.properties();
         let given = [area, moments[0], moments[1], torsion];
-        let sum: f64 = (0..4)
-            .filter(|&k| wanted[k] > 0.0)
-            .map(|k| weights[k] * (given[k] / wanted[k]).ln().powi(2))
-            .sum();
-        (sum / total).sqrt()
-    };
-    let best = table
+        // A property that is not known (the torsion of an old artifact) does not count.
+        let known = || (0..4).filter(|&k| wanted[k] > 0.0);
+        let total: f64 = known().map(|k| weights[k]).sum();
+        let sum: f64 = known().map(|k| weights[k] * (given[k] / wanted[k]).ln().powi(2)).sum();
+        Self { profile: profile.clone(), error: (sum / total).sqrt() }
+    }
+}
+
+/// The profile of the smallest error; of equals the first. `None` for an empty table or a section of no area.
+pub(crate) fn choose(section: &MeanSection, table: &[Profile], weights: [f64; 4]) -> Option<Choice> {
+    if section.area <= 0.0 {
+        return None;
+    }
+    table
         .iter()
-        .map(|profile| (error(profile), profile))
-        .filter(|(error, _)| error.is_finite())
-        .min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(Choice { profile: best.1.clone(), error: best.0 })
+        .map(|profile| Choice::of(profile, section, weights))
+        .filter(|choice| choice.error.is_finite())
+        .min_by(|a, b| a.error.total_cmp(&b.error))
 }
 
 #[cfg(test)]

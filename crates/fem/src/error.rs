@@ -3,6 +3,17 @@
 use thiserror::Error;
 use topipe_progress::Interrupted;
 
+/// Checks that a parameter lies between two values; `range` says so in words.
+pub fn within(
+    name: &'static str,
+    value: f64,
+    low: f64,
+    high: f64,
+    range: &'static str,
+) -> Result<(), FemError> {
+    if value >= low && value <= high { Ok(()) } else { Err(FemError::Parameter { name, value, range }) }
+}
+
 /// Why nothing was computed.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]

@@ -57,7 +57,7 @@ mod surface;
 mod voxelize;
 
 pub use element::Hexahedron;
-pub use error::FemError;
+pub use error::{FemError, within};
 pub use grid::Grid;
 pub use lattice::Lattice;
 pub use load_case::{Load, LoadCase, Region, Support};

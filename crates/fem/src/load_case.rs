@@ -1,7 +1,7 @@
 //! What a user says about material, supports and loads.
 
 use crate::FemError;
-use crate::error::{number, point};
+use crate::error::{number, point, within};
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -132,13 +132,6 @@ pub struct LoadCase {
 impl LoadCase {
     /// Checks what can be checked without a part.
     pub fn check(&self) -> Result<(), FemError> {
-        let within = |name, value: f64, low: f64, high: f64, range| {
-            if value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(FemError::Parameter { name, value, range })
-            }
-        };
         within("young", self.young, 1e-6, 1e9, "from 1e-6 to 1e9 MPa")?;
         within("poisson", self.poisson, 0.0, 0.49, "from 0 to 0.49")?;
         let wrong = |list, k: usize, problem: String| Err(FemError::Entry { list, entry: k + 1, problem });

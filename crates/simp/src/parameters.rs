@@ -3,7 +3,7 @@
 use crate::{Axis, Shape, SimpError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use topipe_fem::{FemError, Load, LoadCase, Region, Support};
+use topipe_fem::{FemError, Load, LoadCase, Region, Support, within};
 
 /// Of what the volume fraction is a share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -124,13 +124,6 @@ impl Parameters {
 
     /// Checks what can be checked before anything is computed.
     pub fn check(&self) -> Result<(), SimpError> {
-        let within = |name, value: f64, low: f64, high: f64, range| {
-            if value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(SimpError::Fem(FemError::Parameter { name, value, range }))
-            }
-        };
         if self.domain.is_empty() {
             return Err(SimpError::NoDomain);
         }

@@ -22,6 +22,30 @@ pub enum StiffnessError {
     /// The part encloses nothing.
     #[error("the part encloses no volume; its faces must look outwards")]
     NoVolume,
+    /// A beam has no profile that could be enlarged.
+    #[error(
+        "beam {beam} has no standard profile; let the `beams` stage have `standard_profiles = true`, or give it `profiles`"
+    )]
+    NoProfile {
+        /// Its number.
+        beam: usize,
+    },
+    /// The table ends before the frame holds.
+    #[error(
+        "{what} is {value}, more than {limit}, and the table has no larger profile of the shape of `{profile}` for beam {beam}; give larger `profiles` to the `beams` stage, or raise the volume fraction of the optimization"
+    )]
+    TooWeak {
+        /// Which figure.
+        what: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it may be.
+        limit: f64,
+        /// The beam that should be larger.
+        beam: usize,
+        /// Its profile.
+        profile: String,
+    },
     /// It was asked to stop.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),

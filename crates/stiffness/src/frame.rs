@@ -9,6 +9,12 @@ use topipe_fem::frame::{Element, Frame, Joint, NodalLoad, Section};
 use topipe_fem::{Attachment, SurfacePoint};
 use topipe_mesh::DVec3;
 
+/// A frame, and which beam each of its elements is a piece of.
+pub(crate) struct FrameModel {
+    pub(crate) frame: Frame,
+    pub(crate) beam_of_element: Vec<usize>,
+}
+
 /// The frame model. `profiles` takes the standard profiles instead of the mean sections; `gap` (mm) is the distance between
 /// points of one patch at the most.
 pub(crate) fn model(
@@ -17,7 +23,7 @@ pub(crate) fn model(
     material: [f64; 2],
     profiles: bool,
     gap: f64,
-) -> Frame {
+) -> FrameModel {
     let [young, poisson] = material;
     let mut frame = Frame { young, poisson, ..Frame::default() };
     frame.nodes = structure.nodes.iter().map(|n| n.position).collect();
@@ -45,7 +51,8 @@ pub(crate) fn model(
             None => frame.links.push([a, b]),
         }
     }
-    for beam in &structure.beams {
+    let mut beam_of_element = Vec::new();
+    for (number, beam) in structure.beams.iter().enumerate() {
         let fine = structure.line(beam, 256);
         let at = |t: f64| {
             let k = ((t * 256.0) as usize).min(255);
@@ -62,6 +69,7 @@ pub(crate) fn model(
             // A piece of no length joins its nodes.
             if frame.nodes[previous as usize].distance(frame.nodes[next as usize]) > 1e-9 * gap {
                 frame.elements.push(Element { nodes: [previous, next], section, axis });
+                beam_of_element.push(number);
             } else {
                 frame.links.push([previous, next]);
             }
@@ -90,7 +98,7 @@ pub(crate) fn model(
             frame.loads.push(load);
         }
     }
-    frame
+    FrameModel { frame, beam_of_element }
 }
 
 fn node_for(structure: &Structure, points: &[SurfacePoint], patch: &[usize]) -> u32 {

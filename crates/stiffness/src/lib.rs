@@ -15,10 +15,12 @@ mod error;
 mod figures;
 mod frame;
 mod parameters;
+mod sizing;
 
 pub use error::StiffnessError;
 pub use figures::{Figures, Stiffness};
 pub use parameters::Parameters;
+pub use sizing::{SizingParameters, enlarge};
 
 use topipe_beams::Structure;
 use topipe_fem::{Attachment, Body, FemError, Grid, Model, Selectors, check_size};
@@ -217,7 +219,7 @@ fn of_frame(
     original: Option<[f64; 2]>,
 ) -> Result<Figures, StiffnessError> {
     let material = [parameters.young, parameters.poisson];
-    let frame = frame::model(structure, attachment, material, profiles, 2.0 * size);
+    let frame = frame::model(structure, attachment, material, profiles, 2.0 * size).frame;
     let solution = frame.solve().map_err(|error| StiffnessError::Model {
         what: "the frame of beams".to_owned(),
         error: Box::new(error),

@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use topipe_fem::{FemError, Load, LoadCase, Support};
+use topipe_fem::{FemError, Load, LoadCase, Support, within};
 
 /// Parameters of the comparison. Lengths in mm, moduli in MPa, forces in N.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -57,13 +57,6 @@ impl Parameters {
 
     /// Checks what can be checked without a part.
     pub fn check(&self) -> Result<(), FemError> {
-        let within = |name, value: f64, low: f64, high: f64, range| {
-            if value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(FemError::Parameter { name, value, range })
-            }
-        };
         if let Some(cell) = self.cell {
             within("cell", cell, 1e-9, 1e9, "a positive length in mm")?;
         }

@@ -4,6 +4,7 @@ mod beams;
 mod import;
 mod quad_matching;
 mod simp;
+mod sizing;
 mod skeleton;
 mod smoothing;
 mod smoothing_study;
@@ -26,6 +27,7 @@ pub fn registry() -> Registry {
         .with_stage(spline_fit::SplineFit)
         .with_stage(skeleton::Skeleton)
         .with_stage(beams::Beams)
+        .with_stage(sizing::Sizing)
         .with_stage(stiffness::CompareStiffness)
         .with_stage(validation::Validation)
         .with_exporters(crate::export::exporters())

@@ -30,15 +30,7 @@ impl Stage for CompareStiffness {
     }
 
     fn check(&self, parameters: &Parameters) -> Result<(), BadValue> {
-        parameters.check().map_err(|error| {
-            let field = match &error {
-                FemError::Parameter { name, .. } => name,
-                FemError::Entry { list, .. } => list,
-                FemError::NoLoad => "loads",
-                _ => "supports",
-            };
-            bad_value(field, &error)
-        })
+        parameters.check().map_err(|error| bad_value(field_of(&error), &error))
     }
 
     fn run(
@@ -56,11 +48,25 @@ impl Stage for CompareStiffness {
             surface: surface.as_deref(),
             beams: beams.as_deref(),
         };
-        compare(&inputs, parameters, context.progress()).map_err(|error| match error {
-            StiffnessError::Interrupted(_) => StageError::Interrupted,
-            error if error.is_bad_parameter() => StageError::BadParameter(error.to_string()),
-            error if error.is_failure() => StageError::Failed(error.to_string()),
-            error => StageError::Refused(error.to_string()),
-        })
+        compare(&inputs, parameters, context.progress()).map_err(stage_error)
+    }
+}
+
+/// The parameter that an error is about.
+pub(super) fn field_of(error: &FemError) -> &'static str {
+    match error {
+        FemError::Parameter { name, .. } => name,
+        FemError::Entry { list, .. } => list,
+        FemError::NoLoad => "loads",
+        _ => "supports",
+    }
+}
+
+pub(super) fn stage_error(error: StiffnessError) -> StageError {
+    match error {
+        StiffnessError::Interrupted(_) => StageError::Interrupted,
+        error if error.is_bad_parameter() => StageError::BadParameter(error.to_string()),
+        error if error.is_failure() => StageError::Failed(error.to_string()),
+        error => StageError::Refused(error.to_string()),
     }
 }
