@@ -98,11 +98,16 @@ fn a_foot_gives_way_by_what_its_springs_do() {
     let clamped = frame.solve().unwrap().compliance();
     frame.nodes.push(frame.nodes[0]);
     frame.clamped = vec![2];
-    let foot = Joint::foot([2, 0], DVec3::X, s.area, 70_000.0, 0.3);
+    let foot = Joint::foot([2, 0], DVec3::X, s.area, None, 70_000.0, 0.3);
     frame.joints = vec![foot];
     let soft = frame.solve().unwrap().compliance();
     let expected = 49.0 * (1.0 / foot.displacement[1] + l * l / foot.turn[1]);
     assert!(((soft - clamped) / expected - 1.0).abs() < 1e-9);
+    // A layer is stiffer the thinner it is, and a deep one is a half-space.
+    let layer = |depth| Joint::foot([2, 0], DVec3::X, s.area, Some(depth), 70_000.0, 0.3);
+    assert!((layer(2.0).displacement[0] / foot.displacement[0] - 2.28).abs() < 1e-12);
+    assert!(layer(4.0).displacement[0] < layer(2.5).displacement[0]);
+    assert!((layer(1e9).turn[1] / foot.turn[1] - 1.0).abs() < 1e-6);
 }
 
 #[test]

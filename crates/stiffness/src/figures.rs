@@ -35,6 +35,9 @@ pub struct Figures {
     pub compliance: f64,
     /// That over the compliance of the original, minus 1; 0 for the original.
     pub compliance_change: f64,
+    /// Of a frame: its compliance over that of the smoothed part, on which its sections were measured, minus 1. The part as
+    /// imported is softer, by the notches between its steps and spikes.
+    pub compliance_change_from_smoothed: Option<f64>,
     /// Volume of the material on the grid; of a frame, of its beams without the non-design parts.
     #[serde(rename = "volume_mm3")]
     pub volume: f64,
@@ -75,14 +78,15 @@ impl Stiffness {
     /// One line per model.
     pub fn to_csv(&self) -> String {
         let mut text = String::from(
-            "model,compliance_Nmm,compliance_change,volume_mm3,compliance_at_equal_volume_Nmm,equal_volume_change,max_von_mises_MPa,max_displacement_mm,elements\n",
+            "model,compliance_Nmm,compliance_change,compliance_change_from_smoothed,volume_mm3,compliance_at_equal_volume_Nmm,equal_volume_change,max_von_mises_MPa,max_displacement_mm,elements\n",
         );
         let optional = |x: Option<f64>| x.map_or_else(String::new, |x| x.to_string());
         for (name, f) in self.models() {
             text += &format!(
-                "{name},{},{},{},{},{},{},{},{}\n",
+                "{name},{},{},{},{},{},{},{},{},{}\n",
                 f.compliance,
                 f.compliance_change,
+                optional(f.compliance_change_from_smoothed),
                 f.volume,
                 optional(f.equal_volume),
                 optional(f.equal_volume_change),

@@ -15,20 +15,74 @@ pub(crate) struct FrameModel {
     pub(crate) beam_of_element: Vec<usize>,
 }
 
-/// The frame model. `profiles` takes the standard profiles instead of the mean sections; `gap` (mm) is the distance between
-/// points of one patch at the most.
+/// Where the nodes of a structure are held and loaded, whatever the sections.
+pub(crate) struct Placement {
+    clamped: Vec<u32>,
+    held: Vec<(u32, [bool; 3])>,
+    loads: Vec<NodalLoad>,
+    /// By link, how deep beneath its foot the part is held, mm.
+    depths: Vec<Option<f64>>,
+}
+
+impl Placement {
+    /// `gap` (mm) is the distance between points of one patch at the most.
+    pub(crate) fn new(structure: &Structure, attachment: &Attachment, gap: f64) -> Self {
+        let mut placement =
+            Self { clamped: Vec::new(), held: Vec::new(), loads: Vec::new(), depths: Vec::new() };
+        let mut depths = vec![f64::INFINITY; structure.links.len()];
+        for (points, directions) in &attachment.supports {
+            for patch in patches(points, gap) {
+                let node = node_for(structure, points, &patch);
+                if *directions != [true; 3] {
+                    placement.held.push((node, *directions));
+                    continue;
+                }
+                placement.clamped.push(node);
+                for (link, depth) in
+                    structure.links.iter().zip(&mut depths).filter(|(l, _)| l.contains(&node))
+                {
+                    let foot = structure.position(if link[0] == node { link[1] } else { link[0] });
+                    let nearest = patch.iter().map(|&k| points[k].point.distance(foot));
+                    *depth = nearest.fold(*depth, f64::min);
+                }
+            }
+        }
+        placement.depths = depths.into_iter().map(|d| d.is_finite().then_some(d)).collect();
+        for (points, forces, case) in &attachment.loads {
+            for patch in patches(points, gap) {
+                let node = node_for(structure, points, &patch);
+                let at = structure.position(node);
+                let mut load = NodalLoad { node, force: DVec3::ZERO, moment: DVec3::ZERO, case: *case };
+                for k in patch {
+                    load.force += forces[k];
+                    load.moment += (points[k].point - at).cross(forces[k]);
+                }
+                placement.loads.push(load);
+            }
+        }
+        placement
+    }
+}
+
+/// The frame model. `profiles` takes the standard profiles instead of the mean sections.
 pub(crate) fn model(
     structure: &Structure,
-    attachment: &Attachment,
+    placement: &Placement,
     material: [f64; 2],
     profiles: bool,
-    gap: f64,
 ) -> FrameModel {
     let [young, poisson] = material;
-    let mut frame = Frame { young, poisson, ..Frame::default() };
-    frame.nodes = structure.nodes.iter().map(|n| n.position).collect();
+    let mut frame = Frame {
+        young,
+        poisson,
+        nodes: structure.nodes.iter().map(|n| n.position).collect(),
+        clamped: placement.clamped.clone(),
+        held: placement.held.clone(),
+        loads: placement.loads.clone(),
+        ..Frame::default()
+    };
     // An interface stands on its non-design part, which gives way beneath it.
-    for &[a, b] in &structure.links {
+    for (&[a, b], &depth) in structure.links.iter().zip(&placement.depths) {
         let is_part = |v: u32| structure.nodes[v as usize].kind == NodeKind::NonDesign;
         let (foot, part) = if is_part(a) { (b, a) } else { (a, b) };
         let beams = structure.beams.iter().filter(|beam| beam.ends.contains(&foot));
@@ -40,19 +94,18 @@ pub(crate) fn model(
                 let copy = frame.nodes.len() as u32;
                 frame.nodes.push(structure.position(foot));
                 frame.links.push([part, copy]);
-                frame.joints.push(Joint::foot(
-                    [copy, foot],
-                    (q - p).normalize_or(DVec3::X),
-                    area,
-                    young,
-                    poisson,
-                ));
+                let along = (q - p).normalize_or(DVec3::X);
+                frame.joints.push(Joint::foot([copy, foot], along, area, depth, young, poisson));
             }
             None => frame.links.push([a, b]),
         }
     }
     let mut beam_of_element = Vec::new();
     for (number, beam) in structure.beams.iter().enumerate() {
+        if is_swallowed(structure, number) {
+            frame.links.push(beam.ends);
+            continue;
+        }
         let fine = structure.line(beam, 256);
         let at = |t: f64| {
             let k = ((t * 256.0) as usize).min(255);
@@ -67,7 +120,9 @@ pub(crate) fn model(
                 (frame.nodes.len() - 1) as u32
             };
             // A piece of no length joins its nodes.
-            if frame.nodes[previous as usize].distance(frame.nodes[next as usize]) > 1e-9 * gap {
+            if frame.nodes[previous as usize].distance(frame.nodes[next as usize])
+                > 1e-9 * beam.section.radius()
+            {
                 frame.elements.push(Element { nodes: [previous, next], section, axis });
                 beam_of_element.push(number);
             } else {
@@ -76,29 +131,29 @@ pub(crate) fn model(
             previous = next;
         }
     }
-    for (points, directions) in &attachment.supports {
-        for patch in patches(points, gap) {
-            let node = node_for(structure, points, &patch);
-            if *directions == [true; 3] {
-                frame.clamped.push(node);
-            } else {
-                frame.held.push((node, *directions));
-            }
-        }
-    }
-    for (points, forces, case) in &attachment.loads {
-        for patch in patches(points, gap) {
-            let node = node_for(structure, points, &patch);
-            let at = structure.position(node);
-            let mut load = NodalLoad { node, force: DVec3::ZERO, moment: DVec3::ZERO, case: *case };
-            for k in patch {
-                load.force += forces[k];
-                load.moment += (points[k].point - at).cross(forces[k]);
-            }
-            frame.loads.push(load);
-        }
-    }
     FrameModel { frame, beam_of_element }
+}
+
+/// Whether all of a beam lies in the material of a longer one that it is joined to: both of its ends are nearer to that one's axis
+/// than it is thick. It is a part of the joint then and has no length that could give way.
+fn is_swallowed(structure: &Structure, number: usize) -> bool {
+    let beam = &structure.beams[number];
+    let length = structure.length(beam);
+    structure.beams.iter().enumerate().any(|(k, other)| {
+        k != number
+            && other.ends.iter().any(|v| beam.ends.contains(v))
+            && structure.length(other) > length
+            && beam.ends.iter().all(|&v| {
+                let line = structure.line(other, 32);
+                let p = structure.position(v);
+                let near = line.windows(2).map(|w| {
+                    let along = w[1] - w[0];
+                    let t = (p - w[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
+                    p.distance(w[0] + t.clamp(0.0, 1.0) * along)
+                });
+                near.fold(f64::INFINITY, f64::min) < other.section.radius()
+            })
+    })
 }
 
 fn node_for(structure: &Structure, points: &[SurfacePoint], patch: &[usize]) -> u32 {

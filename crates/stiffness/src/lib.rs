@@ -8,8 +8,9 @@
 //! Guarantees: figures or a named error before the first solution; the same bytes for any number of threads.
 //!
 //! Non-guarantees: compliances of solids have the error of their grid (see `topipe-fem`), which is nearly the same for all
-//! solids, so that their ratios are better than their values. A frame knows nothing of the width of its joints, and its
-//! non-design parts are rigid.
+//! solids, so that their ratios are better than their values. A frame knows nothing of the width of its joints but that a beam
+//! which lies in the material of a longer one does not give way; its non-design parts are rigid, and give way beneath the feet of
+//! beams like a half-space, or like a layer where they are held.
 
 mod error;
 mod figures;
@@ -124,11 +125,13 @@ pub fn compare(
     progress.step(steps, steps, "solids solved");
     let mut frames = [None, None];
     if let (Some(structure), Some(attachment)) = (inputs.beams, &attachment_of_original) {
+        let smoothed = figures[1].as_ref().map(|f| f.compliance);
+        let placement = frame::Placement::new(structure, attachment, 2.0 * size);
         for (profiles, to) in [false, true].into_iter().zip(&mut frames) {
             if profiles && structure.beams.iter().any(|beam| beam.profile.is_none()) {
                 continue;
             }
-            *to = Some(of_frame(structure, attachment, parameters, profiles, size, at_original)?);
+            *to = Some(of_frame(structure, &placement, parameters, profiles, at_original, smoothed)?);
         }
     }
     let mut figures = figures.into_iter();
@@ -174,6 +177,7 @@ fn solid(
     Ok(Figures {
         compliance,
         compliance_change: compliance / first - 1.0,
+        compliance_change_from_smoothed: None,
         volume,
         equal_volume: Some(equal_volume),
         equal_volume_change: Some(equal_volume / first - 1.0),
@@ -212,14 +216,14 @@ fn near(model: &Model, attachment: &Attachment, away: f64) -> Vec<bool> {
 
 fn of_frame(
     structure: &Structure,
-    attachment: &Attachment,
+    placement: &frame::Placement,
     parameters: &Parameters,
     profiles: bool,
-    size: f64,
     original: Option<[f64; 2]>,
+    smoothed: Option<f64>,
 ) -> Result<Figures, StiffnessError> {
     let material = [parameters.young, parameters.poisson];
-    let frame = frame::model(structure, attachment, material, profiles, 2.0 * size).frame;
+    let frame = frame::model(structure, placement, material, profiles).frame;
     let solution = frame.solve().map_err(|error| StiffnessError::Model {
         what: "the frame of beams".to_owned(),
         error: Box::new(error),
@@ -240,6 +244,7 @@ fn of_frame(
     Ok(Figures {
         compliance,
         compliance_change: compliance / first - 1.0,
+        compliance_change_from_smoothed: smoothed.map(|smoothed| compliance / smoothed - 1.0),
         volume: frame.volume(),
         equal_volume: None,
         equal_volume_change: None,

@@ -112,13 +112,13 @@ pub fn enlarge(
     let size = cell_size(&original.mesh, &comparison);
     let selectors = Selectors::new(&load_case, Some(original), mesh.or(Some(original)), crate::SLACK * size)?;
     let attachment = Attachment::new(&load_case, &original.mesh, &selectors, "", size)?;
+    let placement = frame::Placement::new(structure, &attachment, 2.0 * size);
     let table = structure.parameters.table();
 
     let mut sized = structure.clone();
     sized.parameters.sections = Sections::Profile;
     let solve = |sized: &Structure| {
-        let model =
-            frame::model(sized, &attachment, [parameters.young, parameters.poisson], true, 2.0 * size);
+        let model = frame::model(sized, &placement, [parameters.young, parameters.poisson], true);
         let solution = model.frame.solve().map_err(|error| StiffnessError::Model {
             what: "the frame of beams".to_owned(),
             error: Box::new(error),

@@ -33,7 +33,7 @@ kinds! {
     /// A comparison of smoothing methods.
     Study = "smoothing study" v 1: topipe_smoothing::study::Study;
     /// Compliances under the same loads.
-    Stiffness = "stiffness" v 1: topipe_stiffness::Stiffness;
+    Stiffness = "stiffness" v 2: topipe_stiffness::Stiffness;
     /// The figures of a validation.
-    Report = "report" v 3: topipe_validation::Report;
+    Report = "report" v 4: topipe_validation::Report;
 }

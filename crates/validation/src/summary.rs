@@ -45,8 +45,11 @@ pub fn stiffness_summary(stiffness: &Stiffness) -> String {
         let equal = f
             .equal_volume_change
             .map_or_else(String::new, |change| format!(", {:+.2} % at equal volume", 100.0 * change));
+        let smoothed = f.compliance_change_from_smoothed.map_or_else(String::new, |change| {
+            format!(", {:+.2} % against the smoothed part", 100.0 * change)
+        });
         text += &format!(
-            "           {name}: compliance {} N mm ({:+.2} %{equal}), volume {} mm3, von Mises up to {} MPa, moves by {} mm\n",
+            "           {name}: compliance {} N mm ({:+.2} %{equal}{smoothed}), volume {} mm3, von Mises up to {} MPa, moves by {} mm\n",
             figure(f.compliance),
             100.0 * f.compliance_change,
             figure(f.volume),

@@ -56,15 +56,32 @@ pub struct Joint {
 
 impl Joint {
     /// The foot of a beam on an elastic body: a rigid disk of the beam's area on a half-space (Johnson 1985, chapter 3, for
-    /// displacement along and turn across; Mindlin and Reissner-Sagoci for the others).
-    pub fn foot(nodes: [u32; 2], along: DVec3, area: f64, young: f64, poisson: f64) -> Self {
+    /// displacement along and turn across; Mindlin and Reissner-Sagoci for the others). Where the body is held at a `depth`
+    /// (mm) beneath the foot it is a layer, which is stiffer by `1 + c radius / depth` with c = 1.28 along, 1/2 across and 1/6 for
+    /// the turn across (Kausel and Roesset 1975; Gazetas 1983, table 3). These hold for layers not thinner than the
+    /// radius; a thinner one is taken to be as thick as that.
+    pub fn foot(
+        nodes: [u32; 2],
+        along: DVec3,
+        area: f64,
+        depth: Option<f64>,
+        young: f64,
+        poisson: f64,
+    ) -> Self {
         let radius = (area / std::f64::consts::PI).sqrt();
         let (plane, shear) = (young / (1.0 - poisson * poisson), young / (2.0 * (1.0 + poisson)));
+        let slender = depth.map_or(0.0, |depth| radius / depth.max(radius));
         Self {
             nodes,
             along,
-            displacement: [2.0 * plane * radius, 8.0 * shear * radius / (2.0 - poisson)],
-            turn: [16.0 / 3.0 * shear * radius.powi(3), 4.0 / 3.0 * plane * radius.powi(3)],
+            displacement: [
+                2.0 * plane * radius * (1.0 + 1.28 * slender),
+                8.0 * shear * radius / (2.0 - poisson) * (1.0 + 0.5 * slender),
+            ],
+            turn: [
+                16.0 / 3.0 * shear * radius.powi(3),
+                4.0 / 3.0 * plane * radius.powi(3) * (1.0 + slender / 6.0),
+            ],
         }
     }
 }

@@ -170,6 +170,12 @@ pub(super) const KNOWN: &[Figure] = &[
         No,
     ),
     figure("stiffness.frame.compliance_change", "Compliance of the beams against that", "", No),
+    figure(
+        "stiffness.frame.compliance_change_from_smoothed",
+        "Compliance of the beams against the smoothed mesh",
+        "Compliance of the beams",
+        No,
+    ),
     figure("skeleton.compactness", "Points on branches", "", No),
     figure(
         "skeleton.e_center",
