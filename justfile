@@ -141,3 +141,13 @@ scale sizes="30000 100000 300000 1000000":
         /usr/bin/time -f "$n triangles: %e s, %U s of processors, %M kB" target/release/topipe -q run target/scale-$n.toml \
             --cache target/scale/cache --out target/scale/out-$n || exit 1; \
     done
+
+# Times of elastic solutions and of an optimization: a million cells, full and of bars in void; the whole cantilever.
+stiffness-speed:
+    cargo build --release -p topipe
+    cargo build --release -p topipe-fem --example speed
+    target/release/examples/speed 1000000
+    target/release/examples/speed 1000000 1e6 9
+    rm -rf target/stiffness-speed
+    time target/release/topipe run pipelines/optimization/cantilever.toml --until part \
+        --cache target/stiffness-speed/cache --out target/stiffness-speed/out

@@ -1,17 +1,20 @@
 //! The design space: solids added and taken away, and those that stay as they are.
 
 use crate::Shape;
+use crate::mesh_solid::MeshSolid;
 use crate::shape::Face;
 use rayon::prelude::*;
 use topipe_fem::{Body, Cuts, Grid, Moments, Selector, Surface, SurfacePoint, moments_of_points};
-use topipe_mesh::DVec3;
+use topipe_mesh::{DVec3, TriangleMesh};
 
 /// Points per axis at which a cell at the border of the domain is looked at.
 const SAMPLES: usize = 6;
 
 /// A domain made of solids.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(crate) struct Domain {
+    /// Counts as the first of the solids that are added.
+    pub(crate) mesh: Option<MeshSolid>,
     pub(crate) add: Vec<Shape>,
     pub(crate) subtract: Vec<Shape>,
     pub(crate) non_design: Vec<Shape>,
@@ -22,6 +25,10 @@ impl Domain {
     /// taken away points into it; the sign is for that.
     pub(crate) fn outside(&self, p: DVec3) -> (f64, Face, f64) {
         let mut best = (f64::INFINITY, Face::Plane(DVec3::ZERO, DVec3::Z), 1.0);
+        if let Some(mesh) = &self.mesh {
+            let (distance, face) = mesh.nearest_face(p);
+            best = (distance, face, 1.0);
+        }
         for shape in &self.add {
             let (distance, face) = shape.nearest_face(p);
             if distance < best.0 {
@@ -85,6 +92,13 @@ impl Surface for Domain {
     fn points(&self, selector: &Selector, size: f64) -> Vec<SurfacePoint> {
         let mut points = Vec::new();
         let step = 1e-4 * size;
+        if let Some(solid) = &self.mesh {
+            let border = |p: &SurfacePoint| {
+                self.outside(p.point - step * p.normal).0 < 0.0
+                    && self.outside(p.point + step * p.normal).0 > 0.0
+            };
+            points.extend(solid.mesh.points(selector, size).into_iter().filter(border));
+        }
         let solids = self.add.iter().map(|s| (s, 1.0)).chain(self.subtract.iter().map(|s| (s, -1.0)));
         for (k, (shape, sign)) in solids.enumerate() {
             shape.surface_points(size, |point, normal, area| {
@@ -114,9 +128,8 @@ impl Surface for Domain {
     }
 
     fn bounds(&self) -> (DVec3, DVec3) {
-        self.add
-            .iter()
-            .map(Shape::bounds)
+        let mesh = self.mesh.iter().map(|solid| TriangleMesh::bounds(&solid.mesh));
+        mesh.chain(self.add.iter().map(Shape::bounds))
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), (a, b)| (l.min(a), h.max(b)))
     }
 }
@@ -124,7 +137,12 @@ impl Surface for Domain {
 impl Domain {
     /// Whether a point of the surface of solid `k` also lies on that of an earlier one.
     fn covered(&self, k: usize, p: DVec3, step: f64) -> bool {
-        self.add.iter().chain(&self.subtract).take(k).any(|shape| shape.nearest_face(p).0.abs() < step)
+        let shapes = self.add.iter().chain(&self.subtract).take(k).map(|shape| shape.nearest_face(p).0);
+        self.mesh
+            .iter()
+            .map(|mesh| mesh.nearest_face(p).0)
+            .chain(shapes)
+            .any(|distance| distance.abs() < step)
     }
 }
 
@@ -135,6 +153,7 @@ mod tests {
     #[test]
     fn a_plate_with_a_hole() {
         let domain = Domain {
+            mesh: None,
             add: vec![
                 Shape::Box { min: [0.0; 3], max: [10.0, 10.0, 2.0] },
                 Shape::Box { min: [5.0, 0.0, 0.0], max: [12.0, 10.0, 2.0] },

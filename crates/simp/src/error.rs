@@ -12,7 +12,7 @@ pub enum SimpError {
     #[error(transparent)]
     Fem(FemError),
     /// Nothing to be shaped.
-    #[error("there is no design space: give at least one solid in `domain`")]
+    #[error("there is no design space: give at least one solid in `domain`, or a closed mesh as `space`")]
     NoDomain,
     /// A solid that is none.
     #[error("entry {entry} of `{list}`: {problem}")]

@@ -14,6 +14,7 @@ mod contour;
 mod domain;
 mod error;
 mod filter;
+mod mesh_solid;
 mod optimize;
 mod parameters;
 mod shape;
@@ -41,9 +42,15 @@ pub struct Optimized {
     pub threshold: f64,
 }
 
-/// Optimizes a part. Iterations are kept in `units`.
-pub fn optimize(parameters: &Parameters, units: &Units, progress: &Progress) -> Result<Optimized, SimpError> {
-    let problem = Problem::new(parameters)?;
+/// Optimizes a part. `space` is a closed mesh that belongs to the domain, beside the solids in the parameters. Iterations are kept
+/// in `units`.
+pub fn optimize(
+    parameters: &Parameters,
+    space: Option<&TriangleMesh>,
+    units: &Units,
+    progress: &Progress,
+) -> Result<Optimized, SimpError> {
+    let problem = Problem::new(parameters, space)?;
     let densities = problem.optimize(parameters, units, progress)?;
     let threshold = parameters.threshold.unwrap_or_else(|| threshold(&problem.domain, &densities));
     let mesh = Field::new(&problem.domain, &densities, parameters.surface, threshold).contour();

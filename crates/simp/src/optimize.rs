@@ -2,8 +2,10 @@
 
 use crate::domain::Domain;
 use crate::filter::Filter;
+use crate::mesh_solid::MeshSolid;
 use crate::{FractionOf, Parameters, SimpError};
 use topipe_fem::{Attachment, Grid, Model, Selectors, Surface, check_size};
+use topipe_mesh::TriangleMesh;
 use topipe_progress::{Progress, UnitKey, Units};
 
 /// Cells of a domain for which no size is given.
@@ -38,9 +40,13 @@ pub(crate) struct Problem {
 }
 
 impl Problem {
-    pub(crate) fn new(parameters: &Parameters) -> Result<Self, SimpError> {
+    pub(crate) fn new(parameters: &Parameters, space: Option<&TriangleMesh>) -> Result<Self, SimpError> {
         parameters.check()?;
+        if parameters.domain.is_empty() && space.is_none_or(|mesh| mesh.volume() <= 0.0) {
+            return Err(SimpError::NoDomain);
+        }
         let domain = Domain {
+            mesh: space.map(MeshSolid::new),
             add: parameters.domain.clone(),
             subtract: parameters.subtract.clone(),
             non_design: parameters.non_design.clone(),
@@ -110,12 +116,17 @@ impl Problem {
                 (0..n).map(|e| if design[e] { (sums[e][0] / sums[e][1]) as f32 } else { 1.0 }).collect()
             }
         };
+        let space: Vec<u8> = self.domain.mesh.iter().flat_map(|solid| solid.bytes()).collect();
         let key = |iteration: u32| {
             // All that the optimization depends on, and nothing of what the surface does.
             let mut relevant = parameters.clone();
             (relevant.threshold, relevant.surface, relevant.iterations) = (None, crate::SurfaceForm::Iso, 1);
             let text = serde_json::to_string(&relevant).unwrap_or_default();
-            UnitKey::of("simp iteration").bytes(text.as_bytes()).u64(u64::from(iteration)).finish()
+            UnitKey::of("simp iteration")
+                .bytes(text.as_bytes())
+                .bytes(&space)
+                .u64(u64::from(iteration))
+                .finish()
         };
         let mut compliances: Vec<f64> = Vec::new();
         let mut converged = false;

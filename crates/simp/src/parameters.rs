@@ -31,7 +31,8 @@ pub enum SurfaceForm {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Parameters {
-    /// The design space: solids that are united. `box`, `cylinder` and `prism`.
+    /// The design space: solids that are united, with each other and with the mesh at the input `space`. `box`, `cylinder` and
+    /// `prism`; may be empty where there is a mesh.
     pub domain: Vec<Shape>,
     /// Solids that are taken away from it.
     pub subtract: Vec<Shape>,
@@ -124,9 +125,6 @@ impl Parameters {
 
     /// Checks what can be checked before anything is computed.
     pub fn check(&self) -> Result<(), SimpError> {
-        if self.domain.is_empty() {
-            return Err(SimpError::NoDomain);
-        }
         let lists =
             [("domain", &self.domain), ("subtract", &self.subtract), ("non_design", &self.non_design)];
         for (list, shapes) in lists {

@@ -1,7 +1,7 @@
 //! Optimizations of small domains.
 
 use topipe_fem::{Load, Region, Support};
-use topipe_mesh::{Connectivity, DVec3, Design};
+use topipe_mesh::{Connectivity, DVec3, Design, TriangleMesh};
 use topipe_progress::{Progress, UnitKey, UnitStore, Units};
 use topipe_simp::{Axis, FractionOf, Parameters, Shape, SimpError, SurfaceForm, optimize};
 
@@ -34,7 +34,7 @@ fn beam() -> Parameters {
 fn a_beam_gets_stiffer_at_its_volume_and_keeps_its_hole() {
     for surface in [SurfaceForm::Threshold, SurfaceForm::Iso] {
         let parameters = Parameters { surface, ..beam() };
-        let result = optimize(&parameters, &Units::none(), &Progress::silent()).unwrap();
+        let result = optimize(&parameters, None, &Units::none(), &Progress::silent()).unwrap();
         let c = &result.densities.compliances;
         assert!(result.densities.converged && c.len() < 60, "{c:?}");
         assert!(c[c.len() - 1] < 0.5 * c[0], "{c:?}");
@@ -92,15 +92,16 @@ impl UnitStore for Store {
 #[test]
 fn an_interrupted_run_ends_with_the_same_bytes() {
     let mut parameters = beam();
-    let whole = optimize(&parameters, &Units::none(), &Progress::silent()).unwrap();
+    let whole = optimize(&parameters, None, &Units::none(), &Progress::silent()).unwrap();
     let store = std::sync::Arc::new(Store::default());
     parameters.iterations = 5;
-    optimize(&parameters, &Units::new(store.clone()), &Progress::silent()).unwrap();
+    optimize(&parameters, None, &Units::new(store.clone()), &Progress::silent()).unwrap();
     assert_eq!(store.0.lock().unwrap().1, 5);
     parameters.iterations = 100;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
-    let rest =
-        pool.install(|| optimize(&parameters, &Units::new(store.clone()), &Progress::silent())).unwrap();
+    let rest = pool
+        .install(|| optimize(&parameters, None, &Units::new(store.clone()), &Progress::silent()))
+        .unwrap();
     assert_eq!(rest, whole);
     assert_eq!(store.0.lock().unwrap().1, whole.densities.compliances.len());
 }
@@ -109,7 +110,7 @@ fn an_interrupted_run_ends_with_the_same_bytes() {
 fn symmetry_and_extrusion_hold_exactly() {
     let parameters =
         Parameters { average_along: Some(Axis::Z), symmetry: vec![Axis::Y], iterations: 6, ..beam() };
-    let d = optimize(&parameters, &Units::none(), &Progress::silent()).unwrap().densities;
+    let d = optimize(&parameters, None, &Units::none(), &Progress::silent()).unwrap().densities;
     for k in 0..d.grid.count() {
         let [x, y, z] = d.grid.place(k);
         assert_eq!(d.density[k], d.density[d.grid.index([x, 11 - y, z])]);
@@ -122,7 +123,7 @@ fn what_can_not_be_is_said_before_anything_is_solved() {
     let error = |edit: &dyn Fn(&mut Parameters)| {
         let mut parameters = beam();
         edit(&mut parameters);
-        optimize(&parameters, &Units::none(), &Progress::silent()).map(|_| ()).unwrap_err()
+        optimize(&parameters, None, &Units::none(), &Progress::silent()).map(|_| ()).unwrap_err()
     };
     assert_eq!(error(&|p| p.domain.clear()), SimpError::NoDomain);
     let small = error(&|p| (p.fraction_of, p.volume_fraction) = (FractionOf::Whole, 0.1));
@@ -142,4 +143,21 @@ fn what_can_not_be_is_said_before_anything_is_solved() {
         p.loads[0].region = Region::Box { min: [50.0, 0.0, 0.0], max: [50.0, 5.0, 5.0] };
     });
     assert!(apart.to_string().contains("disconnected"), "{apart}");
+}
+
+/// The same box as a solid and as triangles: the same fractions to a sample, and about the same part.
+#[test]
+fn a_mesh_is_a_design_space_as_well() {
+    let parameters = beam();
+    let solid = optimize(&parameters, None, &Units::none(), &Progress::silent()).unwrap();
+    let space = TriangleMesh::cuboid(DVec3::ZERO, DVec3::new(24.0, 12.0, 6.0));
+    let without = Parameters { domain: Vec::new(), ..parameters };
+    let meshed = optimize(&without, Some(&space), &Units::none(), &Progress::silent()).unwrap();
+    assert_eq!(meshed.densities.fraction, solid.densities.fraction);
+    let [a, b] = [&solid, &meshed].map(|r| r.densities.compliances.last().unwrap());
+    assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
+    assert!((meshed.part.mesh.volume() / solid.part.mesh.volume() - 1.0).abs() < 0.01);
+    assert!(Connectivity::build(&meshed.part.mesh).unwrap().is_closed());
+    let (low, high) = meshed.part.mesh.bounds();
+    assert!(low.cmpge(DVec3::splat(-1e-9)).all() && high.cmple(DVec3::new(24.0, 12.0, 6.0) + 1e-9).all());
 }

@@ -21,13 +21,15 @@ impl Stage for Simp {
     }
 
     fn inputs(&self) -> Vec<InputPort> {
-        Vec::new()
+        vec![InputPort::optional::<Mesh>(
+            "space",
+            "A closed mesh that may be shaped, beside the solids in `domain`. Its labels do not count.",
+        )]
     }
 
     fn check(&self, parameters: &Parameters) -> Result<(), BadValue> {
         parameters.check().map_err(|error| {
             let field = match &error {
-                SimpError::NoDomain => "domain",
                 SimpError::Shape { list, .. } => list,
                 SimpError::Fem(FemError::Parameter { name, .. }) => name,
                 SimpError::Fem(FemError::Entry { list, .. }) => list,
@@ -43,11 +45,15 @@ impl Stage for Simp {
         context: &StageContext<'_>,
         parameters: &Parameters,
     ) -> Result<topipe_mesh::Part, StageError> {
-        let result = optimize(parameters, context.units(), context.progress());
+        let space = context.optional_input::<Mesh>("space")?;
+        let space = space.as_ref().map(|part| &part.mesh);
+        let result = optimize(parameters, space, context.units(), context.progress());
         result.map(|optimized| optimized.part).map_err(|error| match error {
             SimpError::Interrupted(_) => StageError::Interrupted,
             SimpError::Fem(FemError::NotConverged { .. }) => StageError::Failed(error.to_string()),
-            SimpError::FractionTooSmall { .. } => StageError::BadParameter(error.to_string()),
+            SimpError::FractionTooSmall { .. } | SimpError::NoDomain => {
+                StageError::BadParameter(error.to_string())
+            }
             error => StageError::Refused(error.to_string()),
         })
     }
