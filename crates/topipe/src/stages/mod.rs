@@ -245,6 +245,6 @@ mod tests {
         assert!(versions.iter().all(|version| version.len() == 16));
         versions.sort();
         versions.dedup();
-        assert_eq!(versions.len(), 11);
+        assert_eq!(versions.len(), 12);
     }
 }
