@@ -9,6 +9,7 @@ skeleton.json: {"points": [[x, y, z], ...] in mm, "edges": [[i, j], ...], "kinds
 (kinds may be absent: then points of degree 2 are branch points). Other keys are ignored.
 The section is clipped to a cube: with --labels (one 0/1 per face of the mesh, in its order) of twice the largest distance from
 an interface's points to its centre, as the thesis has it; with --cube of that side; else not at all.
+The first of the 36 rays, which the thesis leaves open, and the cube turn with the part: see first_ray.
 Points of kind "non-design" and their edges count for cycles and components only.
 Prints: compactness (branch points), e_center, the same with arc-length weights, points outside, components, cycles,
 genus of the mesh, length; with --axes ({"nodes": ..., "beams": [[i, j, radius], ...]}) the distance to the true axes.
@@ -17,13 +18,36 @@ import argparse, json
 import numpy as np, trimesh, networkx as nx
 
 
+def first_ray(mesh, point, tangent, u, w):
+    """Angle in (u, w) of a principal axis of the nearest contour's area about the point; of its farthest corner if all are principal."""
+    cut = mesh.section(plane_origin=point, plane_normal=tangent)
+    loops = [np.stack([(c - point) @ u, (c - point) @ w], axis=1) for c in cut.discrete]
+
+    def distance(loop):
+        a, d = loop[:-1], np.diff(loop, axis=0)
+        t = np.clip(-(a * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-300), 0, 1)
+        return np.linalg.norm(a + t[:, None] * d, axis=1).min()
+
+    loop = min(loops, key=distance)
+    (ax, ay), (bx, by) = loop[:-1].T, loop[1:].T
+    area = ax * by - ay * bx
+    xx, yy = (area * (ax * ax + ax * bx + bx * bx)).sum(), (area * (ay * ay + ay * by + by * by)).sum()
+    xy = (area * (ax * ay + (ax * by + ay * bx) / 2 + bx * by)).sum()
+    if np.hypot(xx - yy, 2 * xy) > 1e-9 * abs(xx + yy):
+        return np.arctan2(2 * xy, xx - yy) / 2
+    far = loop[np.argmax((loop * loop).sum(axis=1))]
+    return np.arctan2(far[1], far[0])
+
+
 def rays(mesh, points, tangents, inside, cube):
     ref = np.where(np.abs(tangents[:, :1]) < .9, [[1., 0, 0]], [[0, 1., 0]])
     u = np.cross(tangents, ref)
     u /= np.linalg.norm(u, axis=1)[:, None]
     w = np.cross(tangents, u)
+    first = np.array([first_ray(mesh, *at) for at in zip(points, tangents, u, w)])
     th = np.arange(36) * np.pi / 18
-    D = (np.cos(th)[None, :, None] * u[:, None] + np.sin(th)[None, :, None] * w[:, None]).reshape(-1, 3)
+    at = (first[:, None] + th)[:, :, None]
+    D = (np.cos(at) * u[:, None] + np.sin(at) * w[:, None]).reshape(-1, 3)
     O = np.repeat(points, 36, axis=0)
     d = np.zeros(len(O))
     loc, ir, _ = mesh.ray.intersects_location(O, D, multiple_hits=False)
@@ -36,8 +60,9 @@ def rays(mesh, points, tangents, inside, cube):
         far = np.zeros(len(idx))
         np.maximum.at(far, ir, np.linalg.norm(loc - O[idx][ir], axis=1))
         d[idx] = far
-    if cube:  # the section is clipped to a cube around a point inside
-        d = np.where(np.repeat(inside, 36), np.minimum(d, cube / 2 / np.abs(D).max(axis=1)), d)
+    if cube:  # the section is clipped to a cube around a point inside, along the branch and the first ray
+        limit = cube / 2 / np.maximum(np.abs(np.cos(th)), np.abs(np.sin(th)))
+        d = np.where(np.repeat(inside, 36), np.minimum(d, np.tile(limit, len(points))), d)
     return d.reshape(-1, 36)
 
 

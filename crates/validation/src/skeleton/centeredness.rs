@@ -6,8 +6,17 @@
 //! Inside, the nearest hit counts, clipped to a cube of twice the largest interface radius. For a point outside the
 //! far hit counts and a ray that misses is 0: in a unit circle, a point at 0.5 from the middle measures 1, one on the
 //! circle 2, one at 2 measures 3.
+//!
+//! **The first ray and the cube belong to the part.** The thesis sends the first ray through any corner of the contour and
+//! takes a cube along the global axes. Rays ten degrees apart see a facet or not depending on where the first one goes, so
+//! with an axis of the world as reference E_center of fixed points changes by 8 % when the space frame is turned. Here
+//! the first ray goes along a principal axis of the area inside the nearest contour, of its second moments about the
+//! *skeletal point*: for a point off the middle of a circle that is the direction of the middle, so the examples above are
+//! exact wherever the corners of the circle are. (The nearest or farthest corner would also turn with the part, but a single
+//! vertex decides it.) The cube has edges along the branch and the first ray. E_center so depends on nothing but the
+//! shape: turning, moving, scaling and renumbering change it by rounding only.
 
-use super::section::{RAYS, Section};
+use super::section::{RAYS, Section, turn};
 use rayon::prelude::*;
 use topipe_mesh::spatial::SurfaceIndex;
 use topipe_mesh::{DVec3, TriangleMesh};
@@ -39,8 +48,8 @@ pub fn off_center(
             Some(hits) if !inside => hits.farthest,
             None if !inside => 0.0,
             hits => {
-                let limit =
-                    clip.map_or(f64::INFINITY, |half| half / section.direction(k).abs().max_element());
+                let (sin, cos) = turn(k).sin_cos();
+                let limit = clip.map_or(f64::INFINITY, |half| half / sin.abs().max(cos.abs()));
                 // Only an open surface lets a ray escape from inside.
                 let nearest = hits.map_or(if clip.is_some() { limit } else { 0.0 }, |h| h.nearest);
                 nearest.min(limit)
@@ -55,9 +64,12 @@ pub fn off_center(
 mod tests {
     use super::*;
 
-    /// A closed cylinder of radius 1 along z, with corners where rays at multiples of ten degrees hit them.
     fn cylinder() -> TriangleMesh {
-        let n = 3600u32;
+        prism(3600)
+    }
+
+    /// A closed prism along z over a regular polygon of `n` corners on the unit circle.
+    fn prism(n: u32) -> TriangleMesh {
         let ring = |z: f64| {
             (0..n).map(move |k| {
                 let (s, c) = (f64::from(k) / f64::from(n) * std::f64::consts::TAU).sin_cos();
@@ -88,6 +100,30 @@ mod tests {
         let measured = off_center(&mesh, &index, &points, None);
         for (value, expected) in measured.iter().zip([0.0, 1.0, 2.0, 3.0, 1.0]) {
             assert!((value - expected).abs() < 1e-5, "{value} for {expected}");
+        }
+        // Whichever way the point is off the middle.
+        for degrees in [3.0f64, 47.3, 95.01, 261.8] {
+            let (s, c) = degrees.to_radians().sin_cos();
+            let points = [0.5, 1.0 - 1e-7, 2.0].map(|off| at(off * c, off * s));
+            for (value, expected) in off_center(&mesh, &index, &points, None).iter().zip([1.0, 2.0, 3.0]) {
+                assert!((value - expected).abs() < 1e-5, "{value} for {expected} at {degrees} degrees");
+            }
+        }
+    }
+
+    /// In the middle of a triangle all axes are principal; a ray goes through a corner, at 1 with 1/2 opposite.
+    #[test]
+    fn regular_sections_measure_the_same_however_they_lie() {
+        let mesh = prism(3);
+        for k in 0..50 {
+            let axis = DVec3::new(f64::from(k).sin(), f64::from(3 * k).cos(), 0.3).normalize();
+            let (s, c) = (0.37 * f64::from(k)).sin_cos();
+            let turn = |p: DVec3| c * p + s * axis.cross(p) + (1.0 - c) * axis.dot(p) * axis;
+            let mut turned = mesh.clone();
+            turned.positions.iter_mut().for_each(|p| *p = turn(*p));
+            let middle = BranchPoint { position: DVec3::ZERO, tangent: turn(DVec3::Z), length: 1.0 };
+            let value = off_center(&turned, &SurfaceIndex::build(&turned), &[middle], None)[0];
+            assert!((value - 0.5).abs() < 1e-9, "{value} after turn {k}");
         }
     }
 
