@@ -12,6 +12,8 @@ pub(crate) fn crease_normals(mesh: &TriangleMesh, crease: f64) -> Vec<[DVec3; 3]
         .faces()
         .map(|f| if valid(&mesh.triangles[f.index()]) { mesh.area_vector(f) } else { DVec3::ZERO })
         .collect();
+    // Each is looked at from all corners of all faces around it, some twenty times.
+    let unit: Vec<DVec3> = area.iter().map(|n| n.normalize_or_zero()).collect();
     let mut start = vec![0u32; count + 1];
     for triangle in mesh.triangles.iter().filter(|t| valid(t)) {
         for v in triangle {
@@ -33,7 +35,7 @@ pub(crate) fn crease_normals(mesh: &TriangleMesh, crease: f64) -> Vec<[DVec3; 3]
     (0..mesh.face_count())
         .into_par_iter()
         .map(|f| {
-            let own = area[f].normalize_or_zero();
+            let own = unit[f];
             if !valid(&mesh.triangles[f]) {
                 return [own; 3];
             }
@@ -41,8 +43,8 @@ pub(crate) fn crease_normals(mesh: &TriangleMesh, crease: f64) -> Vec<[DVec3; 3]
                 let around = &faces[start[v.index()] as usize..start[v.index() + 1] as usize];
                 let sum: DVec3 = around
                     .iter()
+                    .filter(|g| unit[**g as usize].dot(own) >= limit)
                     .map(|&g| area[g as usize])
-                    .filter(|n| n.normalize_or_zero().dot(own) >= limit)
                     .sum();
                 sum.try_normalize().unwrap_or(own)
             })

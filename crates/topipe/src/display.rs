@@ -9,6 +9,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use topipe_engine::{Event, EventSink, ExportOutcome, Outcome, RunRecord};
+pub(crate) use topipe_report::{duration, size};
 
 /// Whether stderr is a terminal on which colors are welcome (<https://no-color.org>).
 pub(crate) fn colors_on_stderr() -> bool {
@@ -36,16 +37,6 @@ impl Style {
         Self { bold: "\x1b[1m", dim: "\x1b[2m", good: "\x1b[32m", bad: "\x1b[31m", end: "\x1b[0m" };
 }
 
-/// "1.2 s", "340 ms".
-pub(crate) fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 0.0005 => "0 ms".into(),
-        s if s < 1.0 => format!("{:.0} ms", s * 1e3),
-        s if s < 100.0 => format!("{s:.1} s"),
-        s => format!("{:.0} min {:.0} s", (s / 60.0).floor(), s % 60.0),
-    }
-}
-
 /// "5 min", "3 h", "12 d".
 pub(crate) fn span(time: Duration) -> String {
     match time.as_secs() {
@@ -54,18 +45,6 @@ pub(crate) fn span(time: Duration) -> String {
         s if s < 172_800 => format!("{} h", s / 3600),
         s => format!("{} d", s / 86_400),
     }
-}
-
-/// "12 B", "3.4 MB".
-pub(crate) fn size(bytes: u64) -> String {
-    let mut value = bytes as f64;
-    for unit in ["B", "kB", "MB", "GB"] {
-        if value < 1000.0 {
-            return if unit == "B" { format!("{bytes} B") } else { format!("{value:.1} {unit}") };
-        }
-        value /= 1000.0;
-    }
-    format!("{value:.1} TB")
 }
 
 /// Follows a run on stderr: bars on a terminal, lines for what needs attention everywhere.
@@ -327,16 +306,6 @@ fn styled_summary(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn figures_for_people() {
-        assert_eq!(duration(0.0), "0 ms");
-        assert_eq!(duration(0.34), "340 ms");
-        assert_eq!(duration(1.25), "1.2 s");
-        assert_eq!(duration(125.0), "2 min 5 s");
-        assert_eq!(size(999), "999 B");
-        assert_eq!(size(1_234_567), "1.2 MB");
-    }
 
     #[test]
     fn long_lines_go_on_below() {

@@ -7,12 +7,13 @@ mod run;
 use crate::document::{Document, Picture};
 use crate::encode::encode;
 use crate::figures::{Section, State};
+use crate::quantities::duration;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use charts::distributions;
 use figures::{figures_section, headlines};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use run::{files, parameters, pipeline, seconds, stages};
+use run::{files, parameters, pipeline, stages};
 
 const STYLE: &str = include_str!("../../assets/report.css");
 /// In the order of their dependence.
@@ -88,7 +89,7 @@ fn banner(document: &Document, broken: usize) -> Markup {
                 p.meta {
                     (document.program) " \u{b7} "
                     time datetime=(document.started) { (document.started.replace('T', " ").replace('Z', " UTC")) }
-                    " \u{b7} run of " (seconds(document.seconds))
+                    " \u{b7} run of " (duration(document.seconds))
                     @for (name, value) in &document.machine { " \u{b7} " (name) " " (value) }
                 }
             }

@@ -1,6 +1,7 @@
 //! What ran: stages, pipeline, parameters, files.
 
 use crate::document::{Document, Outcome, Stage};
+use crate::quantities::{duration, size};
 use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
 
@@ -39,7 +40,7 @@ pub(super) fn stages(document: &Document) -> Markup {
                                 th scope="row" { (stage.name) }
                                 td title=(stage.summary) { (stage.kind) }
                                 td { (outcome(stage)) @if !stage.reasons.is_empty() { span.message { " \u{2013} " (stage.reasons.join("; ")) } } }
-                                td.right { @if let Some(time) = stage.seconds { (seconds(time)) } @else { "\u{2013}" } }
+                                td.right { @if let Some(time) = stage.seconds { (duration(time)) } @else { "\u{2013}" } }
                                 td.bars {
                                     @if let Some(time) = stage.seconds {
                                         span.timebar.cached[stage.outcome == Outcome::Cached]
@@ -153,24 +154,4 @@ pub(super) fn files(document: &Document) -> Markup {
             }
         }
     }
-}
-
-pub(super) fn seconds(time: f64) -> String {
-    match time {
-        s if s < 0.0005 => "0 ms".into(),
-        s if s < 1.0 => format!("{:.0} ms", s * 1e3),
-        s if s < 100.0 => format!("{s:.1} s"),
-        s => format!("{:.0} min {:.0} s", (s / 60.0).floor(), s % 60.0),
-    }
-}
-
-fn size(bytes: u64) -> String {
-    let mut value = bytes as f64;
-    for unit in ["B", "kB", "MB", "GB"] {
-        if value < 1000.0 {
-            return if unit == "B" { format!("{bytes} B") } else { format!("{value:.1} {unit}") };
-        }
-        value /= 1000.0;
-    }
-    format!("{value:.1} TB")
 }
