@@ -348,9 +348,8 @@ fn vtk_gltf_3mf_and_decks_open_in_other_programs() {
     close("surface", number(&found["surface.glb"], "/volume_mm3") / volume, 1.0, 0.01);
 }
 
-/// Compliance of the spline solid by CalculiX (quadratic tetrahedra) and by ours (cubes): two methods that share nothing.
-#[test]
-fn the_solid_is_as_stiff_as_calculix_says() {
+/// Compliance of a part by CalculiX (quadratic tetrahedra) and by ours (cubes): two methods that share nothing.
+fn is_as_stiff_as_calculix_says(study: &str, part: &str, stage: &str, model: &str, force: [f64; 3]) {
     let Some(python) = clients() else { return };
     // It ends with a status of its own, whatever it did.
     if let Err(reason) = Command::new("ccx").arg("-v").output() {
@@ -358,11 +357,10 @@ fn the_solid_is_as_stiff_as_calculix_says() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let study = root().join("pipelines/studies/stiffness-y-form.toml");
     let fixtures = root().join("fixtures").canonicalize().unwrap();
-    let spec = fs::read_to_string(study).unwrap();
+    let spec = fs::read_to_string(root().join("pipelines/studies").join(format!("{study}.toml"))).unwrap();
     let spec = spec.replace("../../fixtures", &fixtures.display().to_string());
-    let spec = format!("{spec}\"y-form.step\" = \"surface\"\n");
+    let spec = format!("{spec}\"{part}\" = \"{stage}\"\n");
     let file = folder.path().join("pipeline.toml");
     fs::write(&file, &spec).unwrap();
     run(Command::new(env!("CARGO_BIN_EXE_topipe"))
@@ -374,18 +372,31 @@ fn the_solid_is_as_stiff_as_calculix_says() {
         .arg(folder.path().join("cache")))
     .unwrap();
     let ours: Value =
-        serde_json::from_slice(&fs::read(folder.path().join("stiffness-y-form.json")).unwrap()).unwrap();
+        serde_json::from_slice(&fs::read(folder.path().join(format!("{study}.json"))).unwrap()).unwrap();
     // The load case as the spec says it.
     let spec: toml::Table = spec.parse().unwrap();
-    let stage = serde_json::to_value(&spec["stage"]["stiffness"]).unwrap();
-    fs::write(folder.path().join("case.json"), stage.to_string()).unwrap();
-    let theirs =
-        check(python, "check_stiffness.py", &["y-form.step", "case.json", "--size", "3"], folder.path());
+    let case = serde_json::to_value(&spec["stage"]["stiffness"]).unwrap();
+    fs::write(folder.path().join("case.json"), case.to_string()).unwrap();
+    let theirs = check(python, "check_stiffness.py", &[part, "case.json", "--size", "3"], folder.path());
     println!("{theirs:#}");
-    let force = theirs["force_N"][2].as_f64().unwrap();
-    close("force", force, -100.0, 0.1);
-    let ratio = number(&ours, "/surface/compliance_Nmm") / number(&theirs, "/compliance_Nmm");
-    close("compliance over that of CalculiX", ratio, 1.0, 0.03);
+    for (k, force) in force.into_iter().enumerate() {
+        close("force", theirs["force_N"][k].as_f64().unwrap(), force, 0.1);
+    }
+    let ratio = number(&ours, &format!("/{model}/compliance_Nmm")) / number(&theirs, "/compliance_Nmm");
+    println!("{study}: {ratio} of the compliance of CalculiX");
+    close("compliance over that of CalculiX", ratio, 1.0, 0.02);
+}
+
+#[test]
+fn the_solid_is_as_stiff_as_calculix_says() {
+    is_as_stiff_as_calculix_says("stiffness-y-form", "y-form.step", "surface", "surface", [0.0, 0.0, -100.0]);
+}
+
+/// The same triangles: what differs are the elements alone.
+#[test]
+fn oblique_beams_are_as_stiff_as_calculix_says() {
+    let force = [0.0, 300.0, -1000.0];
+    is_as_stiff_as_calculix_says("stiffness-space-frame", "part.stl", "mesh", "original", force);
 }
 
 /// The deck of the space frame (B32R) solved by CalculiX, and the same frame by ours.

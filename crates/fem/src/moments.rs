@@ -35,6 +35,9 @@ impl Cuts {
         let cells: Vec<u32> = (0..fraction.len() as u32)
             .filter(|&c| fraction[c as usize] > 0.0 && fraction[c as usize] < 1.0)
             .collect();
+        if cells.is_empty() {
+            return Self::default();
+        }
         let mut slots = vec![u32::MAX; fraction.len()];
         cells.iter().enumerate().for_each(|(slot, &cell)| slots[cell as usize] = slot as u32);
         let scaled: Vec<DVec3> = mesh.positions.iter().map(|&p| grid.coordinates(p)).collect();
