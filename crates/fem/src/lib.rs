@@ -14,8 +14,9 @@
 //! converges with the square of the cell size: of bars along the axes (0.25, 0.07, 0.02 % for 2, 4, 8 cells across) as of round
 //! ones (-4.2, 0.0, -0.1 % for 4, 8, 16), see `tests/elasticity.rs`.
 //!
-//! Non-guarantees: where a support ends within a face the stress has no bound, and the error there is of first order; stresses at the surface are those in the middle of its cells; members thinner than
-//! two cells are not resolved. Displacements are small and the material is linear.
+//! Non-guarantees: where a support ends within a face the stress has no bound, and the error there is of first order; stresses
+//! at the surface are those in the middle of its cells; members thinner than two cells are not resolved. Displacements are small
+//! and the material is linear.
 //!
 //! ```
 //! use topipe_fem::{Attachment, Body, Grid, Load, LoadCase, Model, Region, Selectors, Support};

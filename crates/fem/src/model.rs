@@ -179,6 +179,8 @@ impl Model {
         let n = self.lattice.node_count as u32;
         // By unknown, of supports in planes: area that is held and area that there is.
         let mut planes: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
+        // Unknowns of the four corners of each face that is held, if only in part.
+        let mut faces: Vec<[u32; 4]> = Vec::new();
         let mut beddings: BTreeMap<u32, Bedding> = BTreeMap::new();
         for ((points, directions), (surface, _)) in supports.iter().zip(&attachment.supports) {
             let held = || (0..3).filter(|&d| directions[d]);
@@ -194,12 +196,15 @@ impl Model {
                     let first = seen.insert((cell, axis));
                     let side = usize::from(at.local[axis] > 0.5);
                     let whole = 0.25 * self.fraction[cell as usize] * self.grid.size * self.grid.size;
-                    for corner in (0..8).filter(|c| c >> axis & 1 == side) {
-                        for d in held() {
-                            let [covered, there] = planes.entry(d as u32 * n + corners[corner]).or_default();
+                    for d in held() {
+                        let mut face = [0; 4];
+                        for (k, corner) in (0..8).filter(|c| c >> axis & 1 == side).enumerate() {
+                            face[k] = d as u32 * n + corners[corner];
+                            let [covered, there] = planes.entry(face[k]).or_default();
                             *covered += weights[corner] * surface.area;
                             *there += if first { whole } else { 0.0 };
                         }
+                        faces.extend(first.then_some(face));
                     }
                 } else {
                     let none = || Bedding { nodes: corners, stiffness: [[0.0; 64]; 3] };
@@ -213,8 +218,16 @@ impl Model {
                 }
             }
         }
-        let covered = planes.into_iter().filter(|(_, [covered, there])| *covered >= COVERED * there);
-        self.fixed = covered.map(|(unknown, _)| unknown).collect();
+        let is_covered = |unknown: &u32| planes.get(unknown).is_some_and(|[c, there]| *c >= COVERED * there);
+        let mut fixed: Vec<u32> = planes.keys().copied().filter(is_covered).collect();
+        // A support narrower than the cells covers no node; it holds the one nearest to it.
+        for face in faces.iter().filter(|face| !face.iter().any(is_covered)) {
+            let cover = |unknown: &u32| planes.get(unknown).map_or(0.0, |p| p[0]);
+            fixed.extend(face.iter().copied().max_by(|a, b| cover(a).total_cmp(&cover(b)).then(b.cmp(a))));
+        }
+        fixed.sort_unstable();
+        fixed.dedup();
+        self.fixed = fixed;
         for (cell, place) in self.lattice.cell_places().enumerate() {
             let Some(corners) = self.lattice.corners(place) else { continue };
             for (corner, node) in corners.into_iter().enumerate() {

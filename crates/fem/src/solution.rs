@@ -31,8 +31,8 @@ impl Solution {
 }
 
 impl Model {
-    /// Solves for all load cases. `modulus` is that of the material in each cell over [`Model::young`]; displacements of a former solution
-    /// are where the search begins. The relative error of the compliance is about the square of `tolerance`.
+    /// Solves for all load cases. `modulus` is that of the material in each cell over [`Model::young`]; displacements of a
+    /// former solution are where the search begins. The relative error of the compliance is about the square of `tolerance`.
     pub fn solve_with(
         &self,
         modulus: impl Fn(usize) -> f64,

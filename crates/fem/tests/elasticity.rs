@@ -146,3 +146,28 @@ fn a_ring_pushed_along_its_axis_shears_as_it_should() {
     println!("shear {errors:?}");
     assert!(errors.iter().all(|e| e.abs() < 0.005), "{errors:?}");
 }
+
+/// A plate on two strips that are narrower than its cells, bent by a load in its middle: about the beam on two edges.
+#[test]
+fn supports_narrower_than_a_cell_hold() {
+    let (length, width, height) = (16.0, 4.0, 2.0);
+    let plate = cuboid([0.0; 3], [length, width, height]);
+    let strip = |x: f64| Support {
+        region: Region::Box { min: [x, 0.0, 0.0], max: [x + 0.2, width, 0.0] },
+        directions: [true; 3],
+    };
+    let middle = Region::Box { min: [7.5, 0.0, height], max: [8.5, width, height] };
+    let load_case = LoadCase {
+        young: 1000.0,
+        poisson: 0.0,
+        supports: vec![strip(0.0), strip(length - 0.2)],
+        loads: vec![pulled(middle, [0.0, 0.0, -1.0])],
+    };
+    let inertia = width * f64::powi(height, 3) / 12.0;
+    // Between free ends and clamped ones: the strips hold the lower face along as well.
+    let bending = length.powi(3) / (48.0 * 1000.0 * inertia);
+    for size in [1.0, 0.5] {
+        let c = solve(&plate, size, &load_case).unwrap().1.compliance();
+        assert!((0.25 * bending..1.3 * bending).contains(&c), "{c} {bending}");
+    }
+}
