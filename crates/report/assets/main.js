@@ -1,5 +1,9 @@
 // The viewer: state, input, and what is written over the canvas.
 
+/** A frame of more milliseconds is slow; after one of fewer, the next motion is tried with less of a hurry. */
+const SLOW = 45;
+const QUICK = 8;
+
 class Viewer {
   constructor(host, header, bytes) {
     this.header = header;
@@ -14,6 +18,9 @@ class Viewer {
     this.preset = '';
     this.marker = null;
     this.ratio = 1;
+    /** How much of a hurry turning the model was the last time. */
+    this.slow = 0;
+    this.lastFrame = 0;
 
     this.canvas = element('canvas', { tabindex: '0', role: 'application', 'aria-roledescription': 'three-dimensional view',
       'aria-label': 'Model. Arrow keys turn it, plus and minus zoom, 1 to 7 choose a view, F fits, S cuts it open.' });
@@ -264,6 +271,7 @@ class Viewer {
 
   /** The model moves, until nothing has moved it for a while. */
   moving() {
+    if (!this.inMotion) this.hurry(this.slow);
     this.inMotion = true;
     this.request();
   }
@@ -273,16 +281,17 @@ class Viewer {
     clearTimeout(this.settling);
     this.settling = setTimeout(() => {
       this.inMotion = false;
-      this.hurry(false);
+      if (this.lastFrame < QUICK) this.slow = Math.max(this.slow - 1, 0);
+      this.hurry(0);
       this.request();
     }, 250);
   }
 
-  /** A slow card draws fewer pixels and thin lines while the model moves. */
-  hurry(hurry) {
-    if (this.renderer.hurry === hurry) return;
-    this.renderer.hurry = hurry;
-    this.ratio = hurry ? 0.5 : 1;
+  /** A slow card draws fewer pixels, fewer triangles and thin lines while the model moves. */
+  hurry(level) {
+    if (this.renderer.hurry === level) return;
+    this.renderer.hurry = level;
+    this.ratio = level ? 0.5 : 1;
     this.resize();
   }
 
@@ -302,9 +311,11 @@ class Viewer {
       // Reading a pixel waits for the card: only so its time is known, and frames do not pile up.
       const { gl } = this.renderer;
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
-      if (performance.now() - begun > 45) this.hurry(true);
+      this.lastFrame = performance.now() - begun;
+      if (this.lastFrame > SLOW && !this.renderer.prepared) this.hurry((this.slow = Math.min(this.renderer.hurry + 1, 2)));
       this.settle();
     }
+    this.renderer.prepared = false;
     this.annotate();
     document.documentElement.dataset.viewer = 'ready';
   }

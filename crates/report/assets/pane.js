@@ -1,13 +1,15 @@
 // Drawing: one canvas with one or two panes, which share geometry and camera and show layers of their own.
 
-/** So many triangles of a surface are drawn while a slow card turns the model. */
-const TRIANGLES_IN_A_HURRY = 40000;
+/** So many triangles of a surface are drawn while a slow card turns the model, and a very slow one. */
+const TRIANGLES_IN_A_HURRY = [Infinity, 40000, 10000];
+/** Samples of a pixel at rest. */
+const SAMPLES = 4;
 
 const STEEL = [0.69, 0.745, 0.8];
 
 class Renderer {
   constructor(canvas, header, bytes) {
-    const gl = canvas.getContext('webgl2', { antialias: true, alpha: false, powerPreference: 'low-power' });
+    const gl = canvas.getContext('webgl2', { antialias: false, alpha: false, powerPreference: 'low-power' });
     if (!gl) throw new Error('this browser has no WebGL 2');
     this.gl = gl;
     this.canvas = canvas;
@@ -21,8 +23,10 @@ class Renderer {
     this.meshes = new Map();
     this.built = new Map();
     this.plane = null;
-    /** Draw fast rather than well. */
-    this.hurry = false;
+    /** Draw well (0), fast rather than well (1), or as fast as can be (2). */
+    this.hurry = 0;
+    /** Whether geometry was made since this was last set to false: that takes longer than a frame. */
+    this.prepared = false;
   }
 
   /** 256 colours between the given ones. */
@@ -105,12 +109,20 @@ class Renderer {
     }
     const indices = this.indices(index);
     gl.bindVertexArray(null);
-    const built = { array, indices, solid: isSolid(points, triangles), fewer: null };
-    // Made when it is first needed: on most cards it never is.
-    built.coarse = () => (built.fewer ??= this.indices(coarsened(index, places, group, TRIANGLES_IN_A_HURRY)));
-    if (index.length < 6 * TRIANGLES_IN_A_HURRY) built.coarse = () => indices;
+    const built = { array, solid: isSolid(points, triangles), levels: [indices] };
+    // Made when they are first needed: on most cards they never are.
+    built.indices = (level) => (built.levels[level] ??= this.coarse(built, level, [index, places, group]));
     this.built.set(key, built);
+    this.prepared = true;
     return built;
+  }
+
+  /** Fewer triangles, where there are more than twice as many as wanted. */
+  coarse(built, level, [index, places, group]) {
+    this.prepared = true;
+    const wanted = TRIANGLES_IN_A_HURRY[level];
+    if (index.length < 6 * wanted) return built.indices(level - 1);
+    return this.indices(coarsened(index, places, group, wanted));
   }
 
   indices(index) {
@@ -168,8 +180,63 @@ class Renderer {
     return built;
   }
 
+  /**
+   * Buffers with several samples a pixel, of the size of the canvas, or null if the card has none. A canvas cannot change its samples,
+   * and while a slow card turns the model they cost half of its time.
+   */
+  samples() {
+    const gl = this.gl;
+    const { width, height } = this.canvas;
+    if (this.sampled?.width === width && this.sampled.height === height) return this.sampled.ready ? this.sampled : null;
+    this.sampled?.buffers.forEach((buffer) => gl.deleteRenderbuffer(buffer));
+    this.sampled?.frames.forEach((frame) => gl.deleteFramebuffer(frame));
+    const buffers = [];
+    const frame = (samples, attachments) => {
+      const made = gl.createFramebuffer();
+      gl.bindFramebuffer(gl.FRAMEBUFFER, made);
+      for (const [attachment, format] of attachments) {
+        const buffer = gl.createRenderbuffer();
+        gl.bindRenderbuffer(gl.RENDERBUFFER, buffer);
+        gl.renderbufferStorageMultisample(gl.RENDERBUFFER, samples, format, width, height);
+        gl.framebufferRenderbuffer(gl.FRAMEBUFFER, attachment, gl.RENDERBUFFER, buffer);
+        buffers.push(buffer);
+      }
+      return made;
+    };
+    const color = [gl.COLOR_ATTACHMENT0, gl.RGBA8];
+    const many = Math.min(SAMPLES, gl.getParameter(gl.MAX_SAMPLES));
+    // Samples are averaged into a buffer of their own format first: that of the canvas differs between browsers.
+    const frames = [frame(many, [color, [gl.DEPTH_ATTACHMENT, gl.DEPTH_COMPONENT24]]), frame(0, [color])];
+    const complete = (made) => {
+      gl.bindFramebuffer(gl.FRAMEBUFFER, made);
+      return gl.checkFramebufferStatus(gl.FRAMEBUFFER) === gl.FRAMEBUFFER_COMPLETE;
+    };
+    this.sampled = { width, height, buffers, frames, ready: frames.every(complete) };
+    return this.sampled.ready ? this.sampled : null;
+  }
+
   /** Draws all panes; `ratio` is pixels of the canvas per pixel of CSS. */
   draw(panes, camera, ranges, ratio) {
+    const gl = this.gl;
+    const { width, height } = this.canvas;
+    const sampled = this.hurry ? null : this.samples();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, sampled?.frames[0] ?? null);
+    this.drawPanes(panes, camera, ranges, ratio);
+    if (!sampled) return;
+    const copy = (from, to) => {
+      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, from);
+      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, to);
+      gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    };
+    copy(sampled.frames[0], sampled.frames[1]);
+    // A browser empties a canvas that it has shown before the next drawing on it; some do not take a copy for drawing.
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    copy(sampled.frames[1], null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  }
+
+  drawPanes(panes, camera, ranges, ratio) {
     const gl = this.gl;
     const { width, height } = this.canvas;
     gl.enable(gl.SCISSOR_TEST);
@@ -228,7 +295,7 @@ class Renderer {
         gl.uniform1f(u.uOpacity, opacity);
         const built = this.surface(surface, color);
         gl.bindVertexArray(built.array);
-        const { buffer, count } = this.hurry ? built.coarse() : built.indices;
+        const { buffer, count } = built.indices(this.hurry);
         gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
         // The far side of a closed surface is never seen, but at silhouettes a pixel might catch it.
         if ((built.solid && !this.plane) || opacity < 1) gl.enable(gl.CULL_FACE);
