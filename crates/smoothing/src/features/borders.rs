@@ -48,6 +48,7 @@ pub(super) fn clean(
     large_enough: impl Fn(&Piece) -> bool,
 ) -> Vec<u32> {
     let mesh = &part.mesh;
+    let grown = owner.to_vec();
     let mut regions: Vec<u32> = (0..fixed.len() as u32).collect();
     loop {
         let pieces = split(part, connectivity, owner, &regions, fixed);
@@ -63,7 +64,52 @@ pub(super) fn clean(
         changed |= part_pinches(mesh, connectivity, owner, &stays);
         regions = pieces.iter().map(|p| p.region).collect();
         if !changed {
-            return regions;
+            break;
+        }
+    }
+    keep_teeth(part, connectivity, owner, &regions, &grown);
+    regions
+}
+
+/// Gives non-design facets that were opened away back to the region they grew in. A non-design facet does not fit by
+/// chance, and all its vertices are frozen: dropped, it stays behind in a free surface that moves away from it, a dent
+/// that no patch can follow. A facet is taken with one edge on a piece of its region where no other facet of any region
+/// is at the tip, or with two edges: neither pinches anything.
+fn keep_teeth(part: &Part, connectivity: &Connectivity, owner: &mut [u32], regions: &[u32], grown: &[u32]) {
+    let mesh = &part.mesh;
+    let mut touched = vec![false; mesh.vertex_count()];
+    for f in mesh.faces().filter(|f| owner[f.index()] != NONE) {
+        mesh.triangles[f.index()].iter().for_each(|v| touched[v.index()] = true);
+    }
+    let dropped = |f: &FaceId| grown[f.index()] != NONE && part.design[f.index()] == Design::NonDesign;
+    let dropped: Vec<FaceId> = mesh.faces().filter(dropped).collect();
+    loop {
+        let mut changed = false;
+        for &f in dropped.iter() {
+            if owner[f.index()] != NONE {
+                continue;
+            }
+            let across = |k: usize| {
+                let across = connectivity.neighbor(f, k);
+                let there = if across.is_some() { owner[across.index()] } else { NONE };
+                (there != NONE && regions[there as usize] == grown[f.index()]).then_some(there)
+            };
+            let sides = [0, 1, 2].map(across);
+            let tip = |k: usize| mesh.triangles[f.index()][(k + 2) % 3];
+            let piece = match sides {
+                [Some(a), Some(b), _] | [Some(a), _, Some(b)] | [_, Some(a), Some(b)] => {
+                    (a == b).then_some(a)
+                }
+                _ => (0..3).find_map(|k| sides[k].filter(|_| !touched[tip(k).index()])),
+            };
+            if let Some(piece) = piece {
+                owner[f.index()] = piece;
+                mesh.triangles[f.index()].iter().for_each(|v| touched[v.index()] = true);
+                changed = true;
+            }
+        }
+        if !changed {
+            return;
         }
     }
 }

@@ -209,7 +209,8 @@ fn every_cylinder_has_a_diameter_of_the_design() {
     }
 }
 
-/// Each region is connected, its border simple closed loops, and no facet of it hangs out by two sides.
+/// Each region is connected, its border simple closed loops, and no facet of the design space hangs out by two sides: it
+/// fits by chance. A non-design facet does not.
 #[test]
 fn borders_of_regions_are_clean() {
     for case in CASES {
@@ -219,7 +220,8 @@ fn borders_of_regions_are_clean() {
         let region = |f: topipe_mesh::FaceId| features.region_of_face[f.index()];
         for f in part.mesh.faces().filter(|&f| region(f).is_some()) {
             let free = (0..3).filter(|&k| !region(connectivity.neighbor(f, k)).is_some()).count();
-            assert!(free < 2, "{case}: {f:?} is a tongue");
+            let by_chance = part.design[f.index()] == topipe_mesh::Design::Design;
+            assert!(free < 2 || free < 3 && !by_chance, "{case}: {f:?} is a tongue");
         }
         for v in part.mesh.vertices() {
             let around: Vec<_> = connectivity.outgoing(v).map(|h| region(h.face())).collect();
