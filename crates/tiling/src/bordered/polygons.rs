@@ -1,4 +1,4 @@
-//! Tiles with many sides, or that bend too much, are divided.
+//! Tiles with many sides, with a reflex corner, or that bend too much, are divided.
 //!
 //! The layout joins the centre of a tile to the middles of its sides, so that of n sides leave corners of 360 / n degrees
 //! there. The cut runs between two stations of the border: a corner, whose angle it halves, or the middle of a side that
@@ -18,6 +18,8 @@ const LEAST_AREA: f64 = 0.25;
 const MIDDLE: f64 = 2.3; // 130 degrees
 /// Wider corners are no better stations.
 const WIDE: f64 = 3.5; // 200 degrees
+/// Tiles with a wider corner between two barriers are cut from it: one quad would lie in it.
+const WIDEST: f64 = 2.8; // 160 degrees
 /// What each side costs that one part has more than the other.
 const UNEVEN: f64 = 0.15;
 /// Tiles more slender than this (see [`slenderness`]) are cut across.
@@ -32,6 +34,8 @@ struct Station {
     /// Index in the border of the half-edge after it.
     at: usize,
     value: f64,
+    /// Angle of a corner between two barriers, radians: there relaxation can not make it narrower. 0 elsewhere.
+    fixed_angle: f64,
     /// Length of the border before it, mm.
     along: f64,
     /// Sides before it, counted from the first corner; halves for middles.
@@ -62,14 +66,23 @@ impl Construction<'_> {
             let bent = area >= LEAST_AREA && normal_cone(surface, faces).0 > limit;
             let slender =
                 area >= LEAST_SLENDER_AREA && slenderness(surface, faces, &outline.border) > SLENDER;
-            if (outline.corners.len() > MOST_SIDES || bent || slender)
-                && self.divide(tile as u32, &outline, slender)
+            let stations = self.stations(&outline);
+            let mut wide = None;
+            for (i, station) in stations.iter().enumerate() {
+                if station.fixed_angle > wide.map_or(WIDEST, |w: usize| stations[w].fixed_angle) {
+                    wide = Some(i);
+                }
+            }
+            if (outline.corners.len() > MOST_SIDES || bent || slender || wide.is_some())
+                && self.divide(tile as u32, &outline, &stations, wide, slender)
             {
                 divided += 1;
             }
         }
         if divided > 0 {
-            self.progress.remark(&format!("{divided} tiles with many sides or strong bends are divided"));
+            self.progress.remark(&format!(
+                "{divided} tiles with many sides, reflex corners or strong bends are divided"
+            ));
         }
         Ok(divided > 0)
     }
@@ -90,9 +103,12 @@ impl Construction<'_> {
                 }
                 h = surface.refiner.twin(h.prev());
             }
+            let before = border[(start + border.len() - 1) % border.len()];
+            let between_barriers = surface.is_barrier(border[start]) && surface.is_barrier(before);
             stations.push(Station {
                 at: start,
                 value: angle.min(WIDE),
+                fixed_angle: if between_barriers { angle } else { 0.0 },
                 along: reach[start],
                 sides: i as f64,
             });
@@ -111,6 +127,7 @@ impl Construction<'_> {
                 stations.push(Station {
                     at: middle,
                     value: MIDDLE,
+                    fixed_angle: 0.0,
                     along: reach[middle],
                     sides: i as f64 + 0.5,
                 });
@@ -119,13 +136,23 @@ impl Construction<'_> {
         stations
     }
 
-    fn divide(&mut self, tile: u32, outline: &Outline, slender: bool) -> bool {
-        let stations = self.stations(outline);
+    /// Cuts the tile between two of its stations, one of them `through` if that is given.
+    fn divide(
+        &mut self,
+        tile: u32,
+        outline: &Outline,
+        stations: &[Station],
+        through: Option<usize>,
+        slender: bool,
+    ) -> bool {
         let all = outline.corners.len() as f64;
         let total: f64 = outline.border.iter().map(|&h| self.surface.length(h)).sum();
         let mut best: Option<(f64, usize, usize)> = None;
         for (i, a) in stations.iter().enumerate() {
-            for b in &stations[i + 1..] {
+            for (j, b) in stations.iter().enumerate().skip(i + 1) {
+                if through.is_some_and(|t| t != i && t != j) {
+                    continue;
+                }
                 // Sides of the two parts, without the cut; each needs two at least.
                 let one = b.sides - a.sides;
                 let two = all - one;
