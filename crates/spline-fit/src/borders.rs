@@ -243,7 +243,7 @@ mod tests {
             for k in 0..SECTORS {
                 let (s, c) = (TAU * f64::from(k) / f64::from(SECTORS)).sin_cos();
                 // Teeth of the outer border, and a bore whose lower end waves.
-                let tooth = if radius > HOLE && z == 0.0 && k % 2 == 0 { 0.15 } else { 0.0 };
+                let tooth = if radius > HOLE && z == 0.0 && k % 2 == 0 { 0.06 } else { 0.0 };
                 let wave = if radius == HOLE && z < 0.0 && !smooth_end { 0.3 * (2.0 * s) } else { 0.0 };
                 let p = DVec3::new((radius + tooth) * c, (radius + tooth) * s, z + wave);
                 points.push((turn * p + away).to_array());
@@ -352,13 +352,35 @@ mod tests {
                 assert!(a.angle_between(b) < 1e-7, "a kink of {}", a.angle_between(b));
             }
             if ring == 2 {
-                // Teeth of 0.15 mm at every second vertex are gone: what is left is nearly their mean circle.
+                // Teeth of 0.06 mm at every second vertex are gone: what is left is nearly their mean circle.
                 for q in 0..4 {
                     for k in 0..50 {
                         let radius = curve(q).position(f64::from(k) / 50.0).distance(away);
-                        assert!((radius - 7.075).abs() < 0.03, "{radius}");
+                        assert!((radius - 7.03).abs() < 0.012, "{radius}");
                     }
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn no_tooth_is_cut_off_farther_than_the_limit() {
+        let (turn, away) = positions()[1];
+        let mut layout = washer(turn, away, true);
+        let mesh = &mut layout.part.mesh;
+        // One tooth of a millimetre amid the small ones.
+        let tip = (2 * SECTORS + 7) as usize;
+        let outwards = (mesh.positions[tip] - away).normalize();
+        mesh.positions[tip] += outwards;
+        let limit = outline::FARTHEST * mesh.diagonal();
+        let found = borders(&layout).unwrap();
+        for (curve, edge) in found.curves.iter().zip(&layout.edges) {
+            for &v in &edge.path {
+                let p = layout.part.mesh.position(v);
+                let curve = curve.as_ref().unwrap();
+                let off = (0..=4000).map(|k| curve.position(f64::from(k) / 4000.0).distance(p));
+                let off = off.fold(f64::INFINITY, f64::min);
+                assert!(off < 1.2 * limit, "{off} of {limit}");
             }
         }
     }

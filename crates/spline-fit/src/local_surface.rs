@@ -75,8 +75,10 @@ const RIDGE: f64 = 1e-4;
 const TURNS: usize = 3;
 /// Widenings by half until enough samples are in reach.
 const WIDENINGS: usize = 8;
-/// Samples (three a face) that fix six coefficients well.
-const ENOUGH: usize = 72;
+/// Samples (three a face) that fix six coefficients. Fits of edges short as mesh edges reach beyond them for more, and cut
+/// ridges off. Mean distance over the diagonal, and places where the triangulated bracket passes through itself: 6.4e-5
+/// and 39 with 72, 6.1e-5 and 68 with 48, 5.9e-5 and 123 with 24.
+const ENOUGH: usize = 48;
 
 /// Fits the surface near `at` to samples within about `radius`. Where the samples say nothing (none of them faces the
 /// known normal, say) the answer is a plane.

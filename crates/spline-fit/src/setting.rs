@@ -14,7 +14,7 @@ use topipe_quad_matching::QuadLayout;
 /// Radius of the local fits over the length of a span.
 const REACH: f64 = 1.25;
 /// From this number of spans on the local fits stay as they are: knots then make the surface follow its normals, and
-/// no longer finer waves of the mesh.
+/// no longer finer waves of the mesh. (With eight, patches pass through each other on monster-lite.)
 const FINEST_REACH: usize = 4;
 
 /// Rounds in which corners are looked for: one finds nearly all, the second those at the other ends of its creases.

@@ -11,6 +11,9 @@ use std::f64::consts::TAU;
 const NARROWEST: (f64, f64) = (40.0 / 360.0 * TAU, 0.6);
 const WIDEST: (f64, f64) = (140.0 / 360.0 * TAU, 1.2);
 
+/// Wider corners are left only where even ones are: at 180 degrees a patch has no normal.
+const STRAIGHT: f64 = 160.0 / 360.0 * TAU;
+
 /// Steps from the directions as they are to even ones.
 const STEPS: usize = 20;
 
@@ -55,7 +58,8 @@ pub(crate) fn spread_between(angles: &mut [f64]) {
 /// The gaps that are nearest to the given ones, on the way to even ones, and within the limits.
 fn spread(gaps: &[f64], total: f64) -> Vec<f64> {
     let even = total / gaps.len() as f64;
-    let (low, high) = (NARROWEST.0.min(NARROWEST.1 * even), WIDEST.0.max(WIDEST.1 * even));
+    let low = NARROWEST.0.min(NARROWEST.1 * even);
+    let high = WIDEST.0.max((WIDEST.1 * even).min(STRAIGHT)).max(even);
     for step in 0..STEPS {
         let share = step as f64 / STEPS as f64;
         let blended: Vec<f64> = gaps.iter().map(|g| g + share * (even - g)).collect();
@@ -95,5 +99,9 @@ mod tests {
         spread_between(&mut angles);
         assert_eq!((angles[0], angles[2]), (0.0, 3.1));
         assert!(angles[1] > 0.69 && angles[1] < 2.42, "{angles:?}");
+        // Two patches around a tooth of 60 degrees: neither gets a straight corner.
+        let mut tooth = [0.0, 3.1, 5.2];
+        spread_between(&mut tooth);
+        assert!(tooth[1] < 2.8 && 5.2 - tooth[1] < 2.8, "{tooth:?}");
     }
 }

@@ -20,7 +20,12 @@ const SHORTEST_WAVE: f64 = 4.0;
 /// A closed border keeps waves longer than this share of its length, however short: the border of a small dent, damped
 /// like a longer one, would shrink to a star.
 const OWN_WAVE: f64 = 0.25;
-/// Spans of the reference curve are at most this many edges of the mesh long.
+/// Farther than this share of the part's diagonal no tooth is cut off: what lies between it and the curve, on either side
+/// of the border, is a deviation of the surface from the mesh.
+pub(super) const FARTHEST: f64 = 1.8e-3;
+/// Rounds in which the weight of teeth that are farther grows.
+const PULLS: usize = 12;
+/// Spans of the reference curve are at most this many edges of the mesh long, and half as long as the edges of the border.
 const FINEST_SPAN: f64 = 2.0;
 /// Spans are joined as long as the curve moves by less than this share of an edge of the mesh.
 const COARSENING: f64 = 0.01;
@@ -98,7 +103,7 @@ pub(super) fn fit(
 ) {
     let development = Development::new(shape);
     let outline = Outline::new(layout, chain, &development, borders);
-    let Some(curve) = outline.curve(chain, grain) else { return };
+    let Some(curve) = outline.curve(chain, grain, layout.part.mesh.diagonal()) else { return };
 
     // Vertices inside the chain move onto the curve.
     let count = chain.sides.len();
@@ -168,7 +173,7 @@ impl Outline {
     }
 
     /// The smoothing spline with as few spans as keep it.
-    fn curve(&self, chain: &Chain, grain: f64) -> Option<Curve> {
+    fn curve(&self, chain: &Chain, grain: f64, diagonal: f64) -> Option<Curve> {
         let length = self.along[self.along.len() - 1];
         if !(length > 0.0 && self.starts.windows(2).all(|w| w[0] < w[1])) {
             return None;
@@ -196,11 +201,12 @@ impl Outline {
             .starts
             .windows(2)
             .map(|w| {
-                let wanted = (w[1] - w[0]) / (FINEST_SPAN * grain);
-                (1..).map(|k| 1 << k).find(|&n| n as f64 >= wanted || n >= MOST_SPANS).unwrap_or(1)
+                let edges = self.along.iter().filter(|&&s| s > w[0] && s <= w[1]).count();
+                let wanted = (((w[1] - w[0]) / (FINEST_SPAN * grain)).ceil() as usize).max(2 * edges);
+                wanted.next_power_of_two().clamp(2, MOST_SPANS)
             })
             .collect();
-        let with = |shift: u32| {
+        let with = |shift: u32, samples: &[Sample]| {
             let mut breaks = vec![self.starts[0]];
             for (w, &n) in self.starts.windows(2).zip(&finest) {
                 let n = (n >> shift).max(1);
@@ -208,8 +214,23 @@ impl Outline {
                     breaks.push(if k == n { w[1] } else { w[0] + (w[1] - w[0]) * k as f64 / n as f64 });
                 }
             }
-            smooth(&breaks, &samples, ends, mu)
+            smooth(&breaks, samples, ends, mu)
         };
+        for _ in 0..PULLS {
+            let curve = with(0, &samples)?;
+            let mut far = false;
+            for sample in &mut samples {
+                let d = curve.at(sample.s).0.distance(sample.point) / (FARTHEST * diagonal);
+                if d > 1.0 {
+                    sample.weight *= 1.0 + 2.0 * d * d;
+                    far = true;
+                }
+            }
+            if !far {
+                break;
+            }
+        }
+        let with = |shift: u32| with(shift, &samples);
         let reference = with(0)?;
         let mut best = reference.clone();
         for shift in 1..=MOST_SPANS.trailing_zeros() {
