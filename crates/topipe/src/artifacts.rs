@@ -35,5 +35,5 @@ kinds! {
     /// Compliances under the same loads.
     Stiffness = "stiffness" v 2: topipe_stiffness::Stiffness;
     /// The figures of a validation.
-    Report = "report" v 4: topipe_validation::Report;
+    Report = "report" v 5: topipe_validation::Report;
 }

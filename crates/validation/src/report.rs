@@ -339,6 +339,9 @@ pub struct SkeletonFigures {
     pub free_ends: usize,
     /// Length of all edges.
     pub length_mm: f64,
+    /// Share of the length outside of non-design parts that lies on branches, so has a section of its own; the rest is
+    /// junctions and what has no beam. An edge from a branch to anything else counts half. `null` without such length.
+    pub beam_share: Option<f64>,
 }
 
 impl Report {

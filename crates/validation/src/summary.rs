@@ -220,11 +220,12 @@ impl Report {
             let e = |e: Option<f64>| e.map_or_else(|| "?".to_owned(), figure);
             writeln!(
                 text,
-                "skeleton   {} branch points, {} branches, {} junctions, {} mm; E_center {} ({} by length)",
+                "skeleton   {} branch points, {} branches, {} junctions, {} mm, {} of it with sections; E_center {} ({} by length)",
                 s.compactness,
                 s.branches,
                 s.junctions,
                 figure(s.length_mm),
+                e(s.beam_share),
                 e(s.e_center),
                 e(s.e_center_by_length)
             )?;

@@ -452,6 +452,13 @@ fn the_axis_of_a_torus_is_centred_and_closes_its_loop() {
     assert_eq!((axis.compactness, axis.cycles, axis.genus, axis.out_of_object), (60, 1, Some(1), 0));
     assert_eq!((axis.branches, axis.junctions, axis.free_ends, axis.components), (1, 0, 0, 1));
     assert!(axis.e_center.unwrap() < 1e-3, "{:?}", axis.e_center);
+    assert_eq!(axis.beam_share, Some(1.0));
+    // A quarter that is not beam, and half of the edges at its two ends.
+    let mut knotted = ring_skeleton(10.0, 60);
+    knotted.kinds[..15].fill(PointKind::Junction);
+    close(of(&knotted).beam_share.unwrap(), 0.75, 1e-9);
+    knotted.kinds[..15].fill(PointKind::NonDesign);
+    assert_eq!(of(&knotted).beam_share, Some(1.0));
 
     // Half a radius off: rays of 0.5 and 1.5, over the radius 11 of the bounding sphere.
     let shifted = of(&ring_skeleton(10.5, 60));

@@ -197,6 +197,7 @@ pub(super) const KNOWN: &[Figure] = &[
     figure("skeleton.components", "Separate pieces", "", No),
     figure("skeleton.free_ends", "Free ends", "", No),
     figure("skeleton.length_mm", "Length of the centre line", "", No),
+    figure("skeleton.beam_share", "Share of it with sections of its own (the rest has no beam)", "", No),
 ];
 
 pub(super) const SECTIONS: &[(&str, &str, &str)] = &[

@@ -72,7 +72,23 @@ pub(crate) fn figures(
             .iter()
             .map(|&[a, b]| skeleton.points[a as usize].distance(skeleton.points[b as usize]))
             .sum(),
+        beam_share: beam_share(skeleton, &edges),
     })
+}
+
+/// How much of the skeleton outside of non-design parts lies on branches.
+fn beam_share(skeleton: &Skeleton, edges: &[[u32; 2]]) -> Option<f64> {
+    let (mut beams, mut whole) = (0.0, 0.0);
+    for ends in edges {
+        let kinds = ends.map(|end| skeleton.kinds[end as usize]);
+        if !kinds.contains(&PointKind::NonDesign) {
+            let [a, b] = ends.map(|end| skeleton.points[end as usize]);
+            let on_branch = kinds.iter().filter(|kind| **kind == PointKind::Branch).count();
+            beams += on_branch as f64 / 2.0 * a.distance(b);
+            whole += a.distance(b);
+        }
+    }
+    (whole > 0.0).then(|| beams / whole)
 }
 
 /// How far each point of a branch is from the middle of its section, mm, in the order of the points: what E_center is the
