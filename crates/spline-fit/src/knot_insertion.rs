@@ -22,8 +22,8 @@ use topipe_mesh::{DVec3, RegionShape};
 use topipe_progress::Progress;
 use topipe_quad_matching::QuadLayout;
 
-/// Shortest span that is divided, as a share of its edge.
-const SHORTEST: f64 = 1.0 / 4096.0;
+/// Shortest span that is divided, as a share of its edge. The narrowest corner of the nine reference parts takes 1/16384.
+const SHORTEST: f64 = 1.0 / 32768.0;
 /// Where in each span normals are compared, as shares of it: both kinds of error are near their largest at one of these.
 const PLACES: [f64; 5] = [0.08, 0.3, 0.5, 0.7, 0.92];
 /// Share of the limit from which on a span is divided: between the places the angle may be larger. With 0.8 one place in a

@@ -31,7 +31,7 @@ pub struct Parameters {
     /// The same in mm; the narrower of both counts.
     pub tolerance_mm: Option<f64>,
     /// Largest angle between the normals of two patches along an edge that is no feature, degrees; knots are inserted
-    /// where it is exceeded, down to spans of 1/4096 of an edge, in patches of bounded size.
+    /// where it is exceeded, down to spans of 1/32768 of an edge, in patches of bounded size.
     pub max_normal_jump: f64,
     /// Polynomial degree in both directions, 2 to 7.
     pub degree: u32,
