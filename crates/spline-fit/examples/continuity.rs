@@ -42,21 +42,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         Source { labels: labels.as_ref().map(|l| (&*labels_path, &l[..])), ..Source::new(&path, &bytes) };
     let part = read_source(&source, &ImportOptions::default(), &silent)?;
     let part = topipe_smoothing::smooth(&part, &Default::default(), &silent)?;
-    if let Ok(at) = std::env::var("AT") {
-        let c: Vec<f64> = at.split(',').map(|x| x.parse().unwrap()).collect();
-        let p = topipe_mesh::DVec3::new(c[0], c[1], c[2]);
-        for f in part.mesh.faces().filter(|&f| part.mesh.corners(f).iter().any(|q| q.distance(p) < c[3])) {
-            println!(
-                "face {} {:?} region {:?} normal {:.2} corners {:?} frozen {:?}",
-                f.0,
-                part.design[f.index()],
-                part.region_of_face[f.index()].0,
-                part.mesh.normal(f),
-                part.mesh.corners(f).map(|q| format!("{q:.2}")),
-                part.mesh.triangles[f.index()].map(|v| part.frozen[v.index()])
-            );
-        }
-    }
     let tile_parameters = topipe_tiling::Parameters { bend, ..Default::default() };
     let tiling = topipe_tiling::tile(&part, &tile_parameters, &silent)?;
     let start = Instant::now();
@@ -140,24 +125,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         jumps.push((worst.0, worst.1, e, *a, b.copied()));
     }
     jumps.sort_by(|a, b| b.0.total_cmp(&a.0));
-    if let Ok(at) = std::env::var("AT") {
-        let c: Vec<f64> = at.split(',').map(|x| x.parse().unwrap()).collect();
-        let p = topipe_mesh::DVec3::new(c[0], c[1], c[2]);
-        for (e, edge) in surface.edges.iter().enumerate() {
-            let n = edge.control.len();
-            for (a, b) in [(0, 1), (n - 1, n - 2)] {
-                if edge.control[a].distance(p) < c[3].max(0.5) {
-                    println!(
-                        "edge {e} {:?} at {:.3} leaves {:.3} chord {:.3} n {n}",
-                        edge.feature,
-                        edge.control[a],
-                        edge.control[b] - edge.control[a],
-                        edge.control[n - 1 - a] - edge.control[a]
-                    );
-                }
-            }
-        }
-    }
     let mesh = surface.tessellate(2e-3 * layout.part.mesh.diagonal());
     println!(
         "triangulated, it passes through itself in {} places",

@@ -9,7 +9,8 @@
 //! - *Pinches*: where a region, or the free surface, meets itself in a vertex, the smaller sector gives way.
 //! - Connected pieces become regions of their own, and pieces that are too small are given up.
 //!
-//! Each step only takes facets away, so the rounds end.
+//! Each step only takes facets away, so the rounds end. After them non-design facets that were opened away come back where
+//! they pinch nothing: they do not fit by chance.
 
 use topipe_mesh::{Connectivity, Design, FaceId, Part, TriangleMesh, VertexId};
 
