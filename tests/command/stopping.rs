@@ -37,18 +37,22 @@ fn an_interrupted_run_ends_with_130_and_the_next_one_finishes() {
     assert_eq!(events[1..3], ["stage-cached mesh", "stage-started smooth"]);
 }
 
-/// A signal ends a run whatever it is doing: here it waits for a file that nobody writes.
+/// A signal ends a run whatever it is doing: here it waits for a shared folder that does not answer.
 #[cfg(unix)]
 #[test]
 fn a_run_that_cannot_stop_by_itself_is_ended() {
     let shop = Workshop::new();
-    std::fs::remove_file(shop.path("box.off")).unwrap();
-    assert!(std::process::Command::new("mkfifo").arg(shop.path("box.off")).status().unwrap().success());
+    let plan = shop.topipe(&["plan", "box.toml", "--json"]).stdout;
+    let plan: serde_json::Value = serde_json::from_str(&plan).unwrap();
+    let (shard, name) = plan["stages"][0]["key"].as_str().unwrap().split_at(2);
+    let folder = shop.path(&format!("shared/keys-v1/{shard}"));
+    std::fs::create_dir_all(&folder).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(folder.join(name)).status().unwrap().success());
     let dropped = "what was in work is dropped";
     for signals in [&["-TERM"][..], &["-INT"], &["-INT", "-INT"], &["-TERM", "-INT"]] {
         let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
             .current_dir(shop.folder.path())
-            .args(["run", "box.toml"])
+            .args(["run", "box.toml", "--remote", "shared"])
             .stderr(std::process::Stdio::piped())
             .spawn()
             .unwrap();

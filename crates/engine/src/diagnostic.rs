@@ -62,6 +62,9 @@ impl Diagnostic {
     }
 }
 
+/// Longer lines are shown in part.
+const LONGEST_LINE: usize = 160;
+
 /// The largest character boundary that is not above `at`.
 fn floor_boundary(text: &str, at: usize) -> usize {
     let mut at = at.min(text.len());
@@ -89,11 +92,24 @@ impl fmt::Display for Diagnostic {
         let start = floor_boundary(&self.source.text, self.span.start);
         let end = floor_boundary(&self.source.text, self.span.end);
         let marked = self.source.text.get(start..end).unwrap_or("").lines().next().unwrap_or("");
-        let carets = marked.chars().count().max(1);
         let gutter = line.to_string().len();
+        // Of a line that fills the screen, what stands around the mark.
+        let (from, length) = (column - 1, text.chars().count());
+        let (first, last) = match length {
+            0..=LONGEST_LINE => (0, length),
+            _ => (from.saturating_sub(LONGEST_LINE / 2), (from + LONGEST_LINE / 2).min(length)),
+        };
+        let carets = marked.chars().count().min(last.saturating_sub(from)).max(1);
+        let before = if first > 0 { "\u{2026}" } else { "" };
+        let after = if last < length { "\u{2026}" } else { "" };
+        let text: String = text.chars().skip(first).take(last - first).collect();
         // Tabs are kept so that the caret stands below the marked text whatever their width.
-        let lead: String =
-            text.chars().take(column - 1).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
+        let lead: String = before
+            .chars()
+            .chain(text.chars().take(from.saturating_sub(first)))
+            .map(|c| if c == '\t' { '\t' } else { ' ' })
+            .collect();
+        let text = format!("{before}{text}{after}");
         writeln!(f, "error: {}", self.message)?;
         writeln!(f, "{:gutter$}--> {}:{line}:{column}", "", self.source.name)?;
         writeln!(f, "{:gutter$} |", "")?;
@@ -122,6 +138,22 @@ mod tests {
         let at = source.text.find('3').unwrap();
         let shown = Diagnostic::new(&source, at..at + 1, "no").help("yes").to_string();
         assert_eq!(shown, "error: no\n --> a.toml:2:6\n  |\n2 | \té = 3\n  | \t    ^\n  = help: yes");
+    }
+
+    #[test]
+    fn of_a_line_that_fills_the_screen_the_part_around_the_mark_is_shown() {
+        let source = source(&format!("{}wrong{}\n", "\u{e9}".repeat(10_000), "b".repeat(100_000)));
+        let at = source.text.find('w').unwrap();
+        let shown = Diagnostic::new(&source, at..at + 5, "no").to_string();
+        assert!(shown.contains("a.toml:1:10001"), "{shown}");
+        let lines: Vec<Vec<char>> = shown.lines().map(|line| line.chars().collect()).collect();
+        assert!(lines.iter().all(|line| line.len() < 180));
+        let carets: Vec<usize> = (0..lines[4].len()).filter(|&k| lines[4][k] == '^').collect();
+        let marked: String = carets.iter().map(|&k| lines[3][k]).collect();
+        assert_eq!(marked, "wrong");
+        // A mark from here to the end of the text ends with what is shown.
+        let shown = Diagnostic::new(&source, at..source.text.len(), "no").to_string();
+        assert!(shown.lines().all(|line| line.chars().count() < 180), "{shown}");
     }
 
     #[test]

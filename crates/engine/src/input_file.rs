@@ -74,6 +74,14 @@ pub enum InputFileError {
         /// Why.
         error: std::io::Error,
     },
+    /// Something that cannot be read twice, or has no end: a folder, a pipe, a device.
+    #[error("{path} is {what}, not a file; write what it holds to a file and name that")]
+    NotAFile {
+        /// What was named.
+        path: String,
+        /// What it is.
+        what: &'static str,
+    },
     /// It is being written.
     #[error("{path} changes while it is read; wait until it is written and run again")]
     Changing {
@@ -88,11 +96,22 @@ pub enum InputFileError {
     },
 }
 
+/// What is at `path`, which must be a file: reading a pipe might wait for ever, reading a device never end.
+fn metadata_of_file(path: &Path) -> Result<Metadata, InputFileError> {
+    let name = || path.display().to_string();
+    let metadata = std::fs::metadata(path).map_err(|error| InputFileError::Io { path: name(), error })?;
+    match metadata.is_file() {
+        true => Ok(metadata),
+        false if metadata.is_dir() => Err(InputFileError::NotAFile { path: name(), what: "a folder" }),
+        false => Err(InputFileError::NotAFile { path: name(), what: "a pipe or a device" }),
+    }
+}
+
 /// Reads a whole file and makes sure that nobody wrote it meanwhile.
 fn read_settled(path: &Path) -> Result<(Vec<u8>, FileMemo), InputFileError> {
     let io = |error| InputFileError::Io { path: path.display().to_string(), error };
     for _ in 0..3 {
-        let before = Stamp::of(&std::fs::metadata(path).map_err(io)?);
+        let before = Stamp::of(&metadata_of_file(path)?);
         let hashed_ns = since_epoch(SystemTime::now());
         let bytes = std::fs::read(path).map_err(io)?;
         let after = Stamp::of(&std::fs::metadata(path).map_err(io)?);
@@ -109,8 +128,7 @@ pub(crate) fn hash_with_memo(
     path: &Path,
     memo: Option<&FileMemo>,
 ) -> Result<(ContentHash, FileMemo), InputFileError> {
-    let metadata = std::fs::metadata(path)
-        .map_err(|error| InputFileError::Io { path: path.display().to_string(), error })?;
+    let metadata = metadata_of_file(path)?;
     if let Some(memo) = memo.filter(|memo| memo.vouches_for(&Stamp::of(&metadata))) {
         return Ok((memo.hash, *memo));
     }
@@ -131,6 +149,11 @@ pub(crate) fn hash_input(path: &Path, cache: &Cache) -> Result<ContentHash, Inpu
         }
     }
     Ok(hash)
+}
+
+/// The hash of what is in a file now; nothing if it cannot be read.
+pub(crate) fn current_hash(path: &Path) -> Option<ContentHash> {
+    read_settled(path).ok().map(|(_, memo)| memo.hash)
 }
 
 /// The content of a file, which must still have the hash its stage's key was made with.

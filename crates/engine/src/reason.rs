@@ -80,7 +80,11 @@ impl fmt::Display for Reason {
             Self::ResultDamaged => f.write_str("its result in the cache is damaged"),
             Self::Kind { old, new } => write!(f, "kind: {old} -> {new}"),
             Self::Code { old, new } => write!(f, "code: {old} -> {new}"),
-            Self::Parameter { field, old, new } => write!(f, "{field}: {old} -> {new}"),
+            Self::Parameter { field, old, new } => {
+                let shown =
+                    |value: &Value| if value.is_null() { "not set".into() } else { value.to_string() };
+                write!(f, "{field}: {} -> {}", shown(old), shown(new))
+            }
             Self::Input { field, old, new } => change(f, &format!("input `{field}`"), old, new),
             Self::File { field, old, new } => change(f, &format!("file `{field}`"), old, new),
         }
@@ -150,10 +154,10 @@ mod tests {
 
     #[test]
     fn a_parameter_is_named_with_its_old_and_new_value() {
-        let then = stage(json!({"a": 1, "deep": {"b": 0.5, "c": "x"}}));
-        let now = stage(json!({"a": 1, "deep": {"b": 0.25, "c": "x"}}));
+        let then = stage(json!({"a": 1, "deep": {"b": 0.5, "c": "x"}, "e": null}));
+        let now = stage(json!({"a": 1, "deep": {"b": 0.25, "c": "x"}, "e": 2}));
         let shown: Vec<String> = changes(Some(&then), &now).iter().map(Reason::to_string).collect();
-        assert_eq!(shown, ["deep.b: 0.5 -> 0.25"]);
+        assert_eq!(shown, ["deep.b: 0.5 -> 0.25", "e: not set -> 2"]);
     }
 
     #[test]

@@ -133,7 +133,7 @@ pub fn changed_files(record: &RunRecord, spec: &Path) -> Vec<ChangedFile> {
     for stage in &record.stages {
         for file in stage.files.values() {
             let path = folder.join(&file.path);
-            let now = std::fs::read(&path).ok().map(|bytes| ContentHash::of(&bytes));
+            let now = crate::input_file::current_hash(&path);
             if now != Some(file.hash) {
                 changed.push(ChangedFile { stage: stage.stage.clone(), path, now });
             }

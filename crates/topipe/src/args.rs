@@ -198,9 +198,9 @@ pub struct RunArguments {
     /// After a failure, still run what does not depend on it.
     #[arg(long)]
     pub keep_going: bool,
-    /// Wait at most this long for another process that computes the same, s [default: for ever].
-    #[arg(long, value_name = "SECONDS")]
-    pub lock_timeout: Option<u64>,
+    /// Wait at most this long for another process that computes the same: "30s", "2h", or seconds [default: for ever].
+    #[arg(long, value_name = "TIME", value_parser = parse_patience)]
+    pub lock_timeout: Option<Duration>,
     /// One JSON object per event on stdout.
     #[arg(long)]
     pub json: bool,
@@ -215,7 +215,7 @@ impl RunArguments {
             choice: self.choice.choice(),
             jobs: self.jobs.map_or(processors, usize::from),
             keep_going: self.keep_going,
-            lock_timeout: self.lock_timeout.map(Duration::from_secs),
+            lock_timeout: self.lock_timeout,
             program: concat!("topipe ", env!("CARGO_PKG_VERSION")).into(),
         }
     }
@@ -382,6 +382,12 @@ fn parse_age(text: &str) -> Result<Duration, String> {
         .find_map(|(name, unit)| Some(text.strip_suffix(*name)?.trim().parse::<f64>().ok()? * unit))
         .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
     seconds.ok_or_else(|| "not a time; use a number and d, h, m or s".into())
+}
+
+/// A time, in seconds where it has no unit.
+fn parse_patience(text: &str) -> Result<Duration, String> {
+    let seconds = text.trim().parse::<f64>().ok().and_then(|s| Duration::try_from_secs_f64(s).ok());
+    seconds.map_or_else(|| parse_age(text), Ok)
 }
 
 /// `topipe diff`.

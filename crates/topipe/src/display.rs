@@ -8,7 +8,7 @@ use std::io::{IsTerminal, Write as _};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
-use topipe_engine::{Event, EventSink, ExportOutcome, Outcome, RunRecord};
+use topipe_engine::{Event, EventSink, ExitCode, ExportOutcome, Outcome, RunRecord};
 pub(crate) use topipe_report::{duration, size};
 
 /// Whether stderr is a terminal on which colors are welcome (<https://no-color.org>).
@@ -255,7 +255,11 @@ fn styled_summary(
     style: Style,
 ) -> String {
     let Style { bold, dim, good, bad, end } = style;
-    let mut text = format!("{bold}{}{end} ({})\n", record.pipeline, duration(record.seconds));
+    let interrupted = match record.code {
+        ExitCode::Interrupted => format!(", {bad}interrupted{end}; run again to go on"),
+        _ => String::new(),
+    };
+    let mut text = format!("{bold}{}{end} ({}){interrupted}\n", record.pipeline, duration(record.seconds));
     let names = record.stages.iter().map(|stage| stage.stage.chars().count()).max().unwrap_or(0);
     let kinds = record.stages.iter().map(|stage| stage.kind.len()).max().unwrap_or(0);
     for stage in &record.stages {

@@ -90,13 +90,21 @@ pub struct Collected {
 /// lease (on a file system without locks).
 const GRACE: Duration = Duration::from_secs(3600);
 
+/// What goes first when there is too much: what serves nothing, what saves a part of a computation, what saves all of it.
+/// Records explain and are small; they go by age alone.
+type Rank = u8;
+const QUARANTINED: Rank = 0;
+const PARTS: Rank = 1;
+const RESULT: Rank = 2;
+const RECORD: Rank = 3;
+
 /// Something that can go as a whole.
 struct Candidate {
     files: Vec<(PathBuf, u64)>,
     what: String,
     used: SystemTime,
     /// Cheaper things go first.
-    rank: u8,
+    rank: Rank,
     hashes: Vec<ContentHash>,
 }
 
@@ -132,7 +140,7 @@ impl Cache {
         let mut lost: HashSet<ContentHash> = HashSet::new();
         for candidate in candidates {
             let too_old = limits.age.is_some_and(|limit| age(now, candidate.used) > limit);
-            let too_much = candidate.rank < 3 && limits.bytes.is_some_and(|limit| left > limit);
+            let too_much = candidate.rank < RECORD && limits.bytes.is_some_and(|limit| left > limit);
             let reason = match (too_old, too_much) {
                 (true, _) => GcReason::Age,
                 (false, true) => GcReason::Size,
@@ -143,7 +151,10 @@ impl Cache {
                 continue;
             }
             left -= candidate.bytes();
-            lost.extend(&candidate.hashes);
+            // Without its finished parts a result is still there.
+            if candidate.rank == RESULT {
+                lost.extend(&candidate.hashes);
+            }
             for (path, bytes) in candidate.files {
                 let (what, hashes) = (candidate.what.clone(), candidate.hashes.clone());
                 plan.items.push(GcItem { path, what, bytes, reason, hashes });
@@ -212,7 +223,7 @@ impl Cache {
                 files: vec![(path, bytes)],
                 what: "finished parts".into(),
                 used,
-                rank: 1,
+                rank: PARTS,
                 hashes,
             });
         }
@@ -223,7 +234,7 @@ impl Cache {
                 files: vec![(path, bytes)],
                 what,
                 used,
-                rank: 0,
+                rank: QUARANTINED,
                 hashes: Vec::new(),
             });
         }
@@ -239,7 +250,7 @@ impl Cache {
                         files: vec![(path, bytes)],
                         what,
                         used,
-                        rank: 3,
+                        rank: RECORD,
                         hashes: Vec::new(),
                     });
                 }
@@ -266,7 +277,7 @@ impl Cache {
         let mut kinds: Vec<&str> = records.iter().map(|record| record.kind.as_str()).collect();
         kinds.sort_unstable();
         kinds.dedup();
-        Candidate { files, what: format!("result of {}", kinds.join(", ")), used, rank: 2, hashes }
+        Candidate { files, what: format!("result of {}", kinds.join(", ")), used, rank: RESULT, hashes }
     }
 
     /// Deletes what a plan says, except what is in use by now. Runs may go on meanwhile.

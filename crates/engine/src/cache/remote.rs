@@ -3,16 +3,19 @@
 //! It holds artifacts and key records under the same names as a cache folder, so that a folder somebody else's runs
 //! fill can be used as it is. Nothing from there is trusted: records carry their checksum and their key, artifacts
 //! their hash, and only what verifies is taken into the local cache. What a run computes is put there content first
-//! and key record last, so that nobody finds a record whose artifact is not there yet. Without a connection the run goes
+//! and key record last, so that nobody finds a record whose artifact is not there yet; it takes the place of what was found
+//! damaged there. Without a connection the run goes
 //! on alone, with one warning.
 
 use super::store::verify;
 use super::temporary::Temporary;
 use super::{Bucket, Cache, Durability, KeyRecord, seal, unseal};
 use crate::hash::ContentHash;
+use std::collections::HashSet;
 use std::io::{ErrorKind, Result, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// A place for files by name. Names are made of letters, digits, `-` and `/`.
 pub trait Remote: Send + Sync {
@@ -80,6 +83,8 @@ pub(super) struct RemoteCache {
     read_only: bool,
     /// It failed once: this process goes on without it.
     away: AtomicBool,
+    /// Artifacts that did not verify: what is there under their names is replaced.
+    bad: Mutex<HashSet<ContentHash>>,
 }
 
 impl std::fmt::Debug for RemoteCache {
@@ -95,7 +100,7 @@ fn name(bucket: Bucket, hash: ContentHash) -> String {
 
 impl RemoteCache {
     pub(super) fn new(remote: Box<dyn Remote>, read_only: bool) -> Self {
-        Self { remote, read_only, away: AtomicBool::new(false) }
+        Self { remote, read_only, away: AtomicBool::new(false), bad: Mutex::default() }
     }
 
     /// Does something with the remote, or remembers that it cannot be reached.
@@ -133,6 +138,7 @@ impl RemoteCache {
         let artifact = self.attempt(|remote| remote.get(&name(Bucket::Artifacts, record.artifact)))??;
         if let Err(error) = verify(&artifact, record.artifact) {
             bad(format!("artifact {}: {error}", record.artifact.short()));
+            self.bad.lock().unwrap_or_else(PoisonError::into_inner).insert(record.artifact);
             return None;
         }
         Some((record, artifact))
@@ -145,7 +151,8 @@ impl RemoteCache {
         let Ok(sealed) = seal(record) else { return };
         self.attempt(|remote| {
             let content = name(Bucket::Artifacts, record.artifact);
-            if !remote.has(&content)? {
+            let bad = self.bad.lock().unwrap_or_else(PoisonError::into_inner).contains(&record.artifact);
+            if bad || !remote.has(&content)? {
                 remote.put(&content, &std::fs::read(artifact)?)?;
             }
             remote.put(&name(Bucket::Keys, record.key), &sealed)

@@ -163,6 +163,10 @@ impl Cache {
         let path = self.path(Bucket::Artifacts, record.artifact);
         match std::fs::metadata(&path) {
             Ok(metadata) if metadata.is_file() && metadata.len() == record.bytes => true,
+            Ok(metadata) if !metadata.is_file() => {
+                damages.push(self.quarantine(&path, "it is not a file"));
+                false
+            }
             Ok(metadata) => {
                 let reason = format!("it has {} bytes, {} were written", metadata.len(), record.bytes);
                 damages.push(self.quarantine(&path, reason));
@@ -199,9 +203,20 @@ impl Cache {
         };
         lease.hold(&[hash]);
         let path = self.path(Bucket::Artifacts, hash);
-        // Equal content is there already as a rule; a damaged file is replaced.
-        if std::fs::read(&path).is_ok_and(|old| old == file) {
-            return Ok(StoredArtifact { hash, bytes: file.len() as u64 });
+        // Equal content may be there already; a damaged file is replaced.
+        match std::fs::metadata(&path) {
+            Ok(metadata) if metadata.is_file() => {
+                let same_length = metadata.len() == file.len() as u64;
+                if same_length && std::fs::read(&path).is_ok_and(|old| old == file) {
+                    return Ok(StoredArtifact { hash, bytes: file.len() as u64 });
+                }
+            }
+            // A file cannot take the place of a folder.
+            Ok(_) => {
+                let damage = self.quarantine(&path, "it is not a file");
+                tracing::warn!("{}: {}; moved aside", damage.path.display(), damage.reason);
+            }
+            Err(_) => {}
         }
         self.write(&path, &file, Durability::Flushed)?;
         crate::failpoint::pass("artifact stored");
@@ -216,6 +231,10 @@ impl Cache {
         damages: &mut Vec<Damage>,
     ) -> Result<Option<Value>, CacheError> {
         let path = self.path(Bucket::Artifacts, hash);
+        if path.is_dir() {
+            damages.push(self.quarantine(&path, "it is not a file"));
+            return Ok(None);
+        }
         let Some(bytes) = read_if_there(&path)? else { return Ok(None) };
         match verify(&bytes, hash).and_then(|()| artifact.decode(&bytes).map_err(|error| error.to_string())) {
             Ok(value) => Ok(Some(value)),
@@ -254,11 +273,17 @@ impl Cache {
         path: &Path,
         damages: &mut Vec<Damage>,
     ) -> Result<Option<T>, CacheError> {
-        let Some(bytes) = read_if_there(path)? else { return Ok(None) };
-        match unseal(&bytes) {
+        let unsealed = match is_file_up_to(path, LONGEST_RECORD) {
+            Ok(()) => {
+                let Some(bytes) = read_if_there(path)? else { return Ok(None) };
+                unseal(&bytes).map_err(|error| error.to_string())
+            }
+            Err(reason) => Err(reason),
+        };
+        match unsealed {
             Ok(value) => Ok(Some(value)),
-            Err(error) => {
-                damages.push(self.quarantine(path, error.to_string()));
+            Err(reason) => {
+                damages.push(self.quarantine(path, reason));
                 Ok(None)
             }
         }
@@ -341,6 +366,21 @@ pub(super) fn hash_of_path(path: &Path) -> Option<ContentHash> {
     let name = path.file_name()?.to_str()?;
     let shard = path.parent()?.file_name()?.to_str()?;
     format!("{shard}{name}").parse().ok()
+}
+
+/// Longer records are not written: that of a run of 10,000 stages has some 15 MB. A forged length allocates no more.
+const LONGEST_RECORD: u64 = 256 << 20;
+
+/// What is wrong with what stands at `path`, if anything does, before it is read.
+fn is_file_up_to(path: &Path, longest: u64) -> Result<(), String> {
+    match std::fs::metadata(path) {
+        Ok(metadata) if !metadata.is_file() => Err("it is not a file".into()),
+        Ok(metadata) if metadata.len() > longest => {
+            Err(format!("it has {} bytes, more than any record", metadata.len()))
+        }
+        // What cannot be looked at cannot be read either, and reading it says why.
+        _ => Ok(()),
+    }
 }
 
 fn record_hash(name: &str) -> ContentHash {

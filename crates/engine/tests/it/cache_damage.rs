@@ -128,3 +128,37 @@ fn lost_memos_and_histories_change_no_result() {
     assert_eq!(log[..4], ["read cached", "soft cached", "loud cached", "size cached"]);
     assert_eq!(log[4..], ["loud.txt written", "size.json written"]);
 }
+
+/// Whatever stands in a place of the cache: a folder, or a file without end (here one with a hole of 40 GB).
+#[test]
+fn what_is_no_file_of_the_cache_is_moved_aside_unread() {
+    let shop = Workshop::new(CHAIN);
+    let (record, _) = shop.run();
+    let path = |bucket, hash: Option<topipe_engine::ContentHash>| shop.cache().path(bucket, hash.unwrap());
+    let (key, artifact) = (record.stages[2].key, record.stages[2].artifact);
+    let places = [path(Bucket::Keys, key), path(Bucket::Artifacts, artifact)];
+    for (place, bucket) in places.iter().zip(["keys-v1", "artifacts-v1"]) {
+        std::fs::remove_file(place).unwrap();
+        std::fs::create_dir(place).unwrap();
+        let log = shop.log();
+        assert_eq!(log[2], format!("quarantined from {bucket}: it is not a file"));
+        assert_eq!(log[3], "loud starts: its result is no longer in the cache");
+        assert_eq!(shop.log()[2], "loud cached");
+
+        std::fs::File::options().write(true).open(place).unwrap().set_len(40_000_000_000).unwrap();
+        let log = shop.log();
+        assert!(
+            log[2].starts_with(&format!("quarantined from {bucket}: it has 40000000000 bytes")),
+            "{log:#?}"
+        );
+        assert_eq!(shop.log()[2], "loud cached");
+    }
+    // A folder where an artifact is going to be.
+    std::fs::remove_file(&places[0]).unwrap();
+    std::fs::remove_file(&places[1]).unwrap();
+    std::fs::create_dir(&places[1]).unwrap();
+    assert_eq!(shop.run().0.exit_code, 0);
+    assert!(places[1].is_file());
+    assert_eq!(shop.out("loud.txt"), "hello.!");
+    assert_eq!(shop.cache().verify().unwrap().1, []);
+}

@@ -85,6 +85,23 @@ fn what_was_not_used_for_longest_goes_first() {
     assert_eq!(after.items, []);
 }
 
+/// Finished parts of a result that is there go first and cost no run its result.
+#[test]
+fn finished_parts_go_without_hurting_the_run_that_made_them() {
+    let mut shop = Workshop::new(
+        "[stage.read]\nkind = 'read'\npath = 'in.txt'\n[stage.loud]\nkind = 'shout'\ninput = 'read'\n\
+         [export]\n'loud.txt' = 'loud'\n",
+    );
+    shop.registry = crate::toy::registry().with_stage(crate::toy::Shout::default());
+    shop.run();
+    let all = plan(&shop, GcLimits::default()).kept_bytes;
+    let plan = plan(&shop, GcLimits { bytes: Some(all - 1), age: None });
+    assert_eq!(plan.items.iter().map(|item| item.what.as_str()).collect::<Vec<_>>(), ["finished parts"]);
+    assert_eq!(plan.hurt, []);
+    shop.cache().collect(&plan).unwrap();
+    assert_eq!(shop.log()[..2], ["read cached", "loud cached"]);
+}
+
 #[test]
 fn a_clock_that_was_set_back_makes_nothing_old() {
     let shop = Workshop::new(CHAIN);

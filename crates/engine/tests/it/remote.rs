@@ -55,7 +55,7 @@ fn a_cache_folder_can_be_read_by_others_and_read_only_leaves_it_alone() {
 }
 
 #[test]
-fn damage_on_the_remote_is_not_taken_over() {
+fn damage_on_the_remote_is_not_taken_over_but_made_good() {
     let shop = Workshop::new(CHAIN);
     log(&shop, &here(&shop, "one").with_remote(shared(&shop), false));
     let far = Cache::new(shop.path("shared"));
@@ -71,6 +71,12 @@ fn damage_on_the_remote_is_not_taken_over() {
     assert!(log[1].starts_with("read starts"), "{log:#?}");
     assert_eq!(shop.out("loud.txt"), "hello.!");
     assert_eq!(second.verify().unwrap().1, []);
+    // The records were damaged as well, so that no artifact was looked at; now they are.
+    let third = here(&shop, "three").with_remote(shared(&shop), false);
+    let log = self::log(&shop, &third);
+    assert!(log[1].starts_with("read starts"), "{log:#?}");
+    assert_eq!(far.verify().unwrap().1, []);
+    assert_eq!(self::log(&shop, &here(&shop, "four").with_remote(shared(&shop), false))[1..5], CACHED);
 }
 
 #[test]

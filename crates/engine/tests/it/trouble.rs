@@ -137,3 +137,21 @@ fn a_file_that_changes_after_it_was_hashed_fails_its_stage() {
     assert!(shop.log()[0].starts_with("read starts"));
     assert_eq!(shop.out("loud.txt"), "goodbye.!");
 }
+
+/// A pipe would be waited for, a device read without end.
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_refused_as_input_before_it_is_opened() {
+    let shop = Workshop::new(CHAIN);
+    let made = std::process::Command::new("mkfifo").arg(shop.path("pipe.txt")).status().unwrap();
+    assert!(made.success());
+    let (pipe, folder) = (shop.path("pipe.txt"), shop.folder().to_owned());
+    for (path, what) in
+        [(pipe, "a pipe or a device"), ("/dev/zero".into(), "a pipe or a device"), (folder, "a folder")]
+    {
+        let pipeline = shop.pipeline(&[&format!("read.path={path:?}")]);
+        let error = topipe_engine::plan(&pipeline, &shop.cache(), &Default::default()).unwrap_err();
+        assert_eq!(error.exit_code().number(), 4);
+        assert!(error.to_string().contains(&format!("{what}, not a file")), "{error}");
+    }
+}

@@ -22,17 +22,59 @@ pub(crate) fn run(arguments: &DiffArguments) -> Result<ExitCode, Failure> {
     let mut text = describe(&difference);
     for (stage, figures) in changed_figures(&before, &after, &cache) {
         let _ = writeln!(text, "\n{stage}");
-        for (name, old, new) in figures {
-            let _ = writeln!(text, "  {name}: {old} -> {new}");
+        let (told, hardly): (Vec<_>, Vec<_>) =
+            figures.into_iter().partition(|(_, old, new)| shown(old) != shown(new));
+        for (name, old, new) in told {
+            let _ = writeln!(text, "  {name}: {}", change(&old, &new));
+        }
+        if !hardly.is_empty() {
+            let names: Vec<&str> = hardly.iter().map(|(name, ..)| name.as_str()).collect();
+            let _ = writeln!(text, "  in the seventh digit: {}", names.join(", "));
         }
     }
+    // What it took when it was computed, in whichever run that was.
+    let seconds = |run: &RunRecord| run.stages.iter().filter_map(|stage| stage.seconds).sum::<f64>();
     let _ = writeln!(
         text,
-        "\ntime: {} -> {}",
-        display::duration(before.seconds),
-        display::duration(after.seconds)
+        "\ntime of all stages: {} -> {}",
+        display::duration(seconds(&before)),
+        display::duration(seconds(&after))
     );
     super::print(&text)
+}
+
+/// "0.25 -> 0.5 (+100 %)". Numbers as far as anyone reads them; a share where it says something.
+fn change(old: &Value, new: &Value) -> String {
+    let share = match (old.as_f64(), new.as_f64()) {
+        (Some(old), Some(new)) if old != 0.0 && old.signum() == new.signum() => {
+            let percent = 100.0 * (new / old - 1.0);
+            match percent.abs() {
+                1e3.. => String::new(),
+                p if p >= 0.05 => format!(" ({percent:+.1} %)"),
+                _ => String::new(),
+            }
+        }
+        _ => String::new(),
+    };
+    format!("{} -> {}{share}", shown(old), shown(new))
+}
+
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Null => "none".into(),
+        Value::String(text) => text.clone(),
+        Value::Number(number) if number.is_f64() => number.as_f64().map_or_else(String::new, |x| {
+            // Six digits, without zeros at the end.
+            let digits = format!("{x:.5e}").parse::<f64>().unwrap_or(x);
+            if digits != 0.0 && !(1e-4..1e7).contains(&digits.abs()) {
+                format!("{digits:e}")
+            } else {
+                digits.to_string()
+            }
+        }),
+        Value::Array(items) => format!("({})", items.iter().map(shown).collect::<Vec<_>>().join(", ")),
+        other => other.to_string(),
+    }
 }
 
 /// The differences as text; also what `reproduce` tells.
@@ -90,6 +132,9 @@ fn changed_figures(before: &RunRecord, after: &RunRecord, cache: &Cache) -> Vec<
     changed
 }
 
+/// Longer lists of holes and the like are not told one by one.
+const MOST_LISTED: usize = 12;
+
 fn compare_values(name: &str, old: &Value, new: &Value, figures: &mut Figures) {
     match (old, new) {
         (Value::Object(then), Value::Object(now)) => {
@@ -98,7 +143,17 @@ fn compare_values(name: &str, old: &Value, new: &Value, figures: &mut Figures) {
                 compare_values(&name, then.get(field).unwrap_or(&Value::Null), new, figures);
             }
         }
-        // Lists of holes and the like are told by their number.
+        // Holes and the like: one by one where there are as many as before, otherwise by their number.
+        (Value::Array(then), Value::Array(now)) if now.iter().chain(then).any(Value::is_object) => {
+            if then.len() != now.len() {
+                figures.push((format!("{name} (number)"), then.len().into(), now.len().into()));
+            } else if now.len() <= MOST_LISTED {
+                for (k, (old, new)) in then.iter().zip(now).enumerate() {
+                    compare_values(&format!("{name}.{k}"), old, new, figures);
+                }
+            }
+        }
+        // Counts of a histogram: it has figures of its own.
         (Value::Array(then), Value::Array(now)) if then.len() > 3 || now.len() > 3 => {
             let (old, new) = (then.len(), now.len());
             figures.extend((old != new).then(|| (format!("{name} (number)"), old.into(), new.into())));

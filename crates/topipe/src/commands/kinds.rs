@@ -23,8 +23,9 @@ pub(crate) fn run(kind: Option<&str>) -> Result<ExitCode, Failure> {
 
 fn list(registry: &Registry) -> String {
     let mut text = String::new();
+    let width = registry.stages().map(|stage| stage.kind().len()).max().unwrap_or(0);
     for stage in registry.stages() {
-        let _ = writeln!(text, "{:14} {}", stage.kind(), stage.summary());
+        let _ = writeln!(text, "{:width$}  {}", stage.kind(), stage.summary());
     }
     text
 }

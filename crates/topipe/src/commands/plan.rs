@@ -31,7 +31,9 @@ fn describe(plan: &Plan) -> String {
         let action = match &stage.action {
             Action::Cached => "cached".to_owned(),
             Action::Run => "runs".to_owned(),
-            Action::Depends { on } => format!("runs if the result of {} changes", on.join(" or ")),
+            // What has changed already makes it run, unless the result of just this is known.
+            Action::Depends { on } if !stage.reasons.is_empty() => format!("runs after {}", list(on, "and")),
+            Action::Depends { on } => format!("runs if {} gives another result", list(on, "or")),
             Action::Missing => "is not selected and has no result: run it first".to_owned(),
         };
         let _ = writeln!(text, "  {:names$}  {:kinds$}  {action}", stage.stage, stage.kind);
@@ -43,6 +45,15 @@ fn describe(plan: &Plan) -> String {
         }
     }
     text
+}
+
+/// "a, b or c".
+fn list(names: &[String], last: &str) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [before @ .., end] => format!("{} {last} {end}", before.join(", ")),
+    }
 }
 
 /// "resumes: 812 of 876 patches kept from an interrupted run".
