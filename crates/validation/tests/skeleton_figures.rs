@@ -187,7 +187,8 @@ fn the_frame_has_its_true_axes_and_nodes() {
     let rms = (sum / f64::from(count)).sqrt();
     assert!(count > 40 && rms <= 0.01, "{count} points, rms {rms} mm");
     let found = figures(&part, &skeleton);
-    assert!(found.e_center.unwrap() <= 0.0008, "{:?}", found.e_center);
+    println!("{count} points away from the nodes, rms {rms:.5} mm; E_center {:.5}", found.e_center.unwrap());
+    assert!(found.e_center.unwrap() <= 0.0007, "{:?}", found.e_center);
     assert_eq!((found.cycles, found.out_of_object), (1, 0));
 
     // The facets of the mesh are no circle, so that the true axes themselves are not in its middle: no farther off than these.

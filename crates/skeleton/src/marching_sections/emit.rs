@@ -198,11 +198,11 @@ fn centred(
     for round in 0..ROUNDS {
         let n = points.len();
         let at = |points: &[Loop], k: isize| match (k, ring) {
-            (-1, true) => points[n - 1].centroid,
+            (-1, true) => points[n - 1].middle,
             (-1, false) => ends[0].at,
-            (k, true) if k as usize == n => points[0].centroid,
+            (k, true) if k as usize == n => points[0].middle,
             (k, false) if k as usize == n => ends[1].at,
-            (k, _) => points[k as usize].centroid,
+            (k, _) => points[k as usize].middle,
         };
         let mut good = vec![false; n];
         let mut next = points.clone();
@@ -211,11 +211,12 @@ fn centred(
             if tangent == DVec3::ZERO {
                 continue;
             }
-            let found = cutter.cut(points[k].centroid, tangent, &branch.vertices, near);
-            if let Some(found) =
+            let found = cutter.cut(points[k].middle, tangent, &branch.vertices, near);
+            if let Some(mut found) =
                 found.filter(|l| l.holds_centroid && !l.cut_off && l.own >= OWN && l.area <= most[k])
             {
-                good[k] = inside.contains(found.centroid);
+                cutter.centre(&mut found, points[k].middle);
+                good[k] = inside.contains(found.middle);
                 next[k] = found;
             }
         }
@@ -243,12 +244,12 @@ fn centred(
         .into_iter()
         .map(|l| {
             // Once more, for the outline: of all the loops cut so far only those of the skeleton need torsion.
-            let torsion = match cutter.cut(l.centroid, l.normal, &branch.vertices, near) {
+            let torsion = match cutter.cut(l.middle, l.normal, &branch.vertices, near) {
                 Some(_) => torsion_constant(cutter.outline()),
                 None => 0.0,
             };
             let Loop { area, normal, moments, axis, .. } = l;
-            (within(l.centroid, inside), Section::Plane { area, normal, moments, axis, torsion })
+            (within(l.middle, inside), Section::Plane { area, normal, moments, axis, torsion })
         })
         .collect()
 }

@@ -11,6 +11,8 @@ pub(super) struct Loop {
     pub(super) area: f64,
     /// Its area centroid.
     pub(super) centroid: DVec3,
+    /// Its middle; the centroid unless [`Cutter::centre`] was asked.
+    pub(super) middle: DVec3,
     /// The unit normal of the plane.
     pub(super) normal: DVec3,
     /// Principal second moments about the centroid, the larger first, mm^4.
@@ -57,6 +59,16 @@ impl<'a> Cutter<'a> {
     /// The outline of the loop that the last cut returned, in two axes of its plane.
     pub(super) fn outline(&self) -> &[DVec2] {
         &self.outline
+    }
+
+    /// Finds the middle of the loop that the last cut, through `origin`, returned.
+    pub(super) fn centre(&self, found: &mut Loop, origin: DVec3) {
+        let (x, y) = found.normal.any_orthonormal_pair();
+        let from = found.centroid - origin;
+        let centroid = DVec2::new(from.dot(x), from.dot(y));
+        let radius = (found.area / std::f64::consts::PI).sqrt();
+        let middle = super::middle::middle(&self.outline, centroid, radius);
+        found.middle = found.centroid + (middle.x - centroid.x) * x + (middle.y - centroid.y) * y;
     }
 
     /// Says whose sections the next cuts are for.
@@ -174,6 +186,7 @@ fn measure(points: &[DVec2], origin: DVec3, normal: DVec3, x: DVec3, y: DVec3) -
     Some(Loop {
         area,
         centroid: origin + center.x * x + center.y * y,
+        middle: origin + center.x * x + center.y * y,
         normal,
         moments: [mean + radius, (mean - radius).max(0.0)],
         axis: angle.cos() * x + angle.sin() * y,
