@@ -1,6 +1,6 @@
 //! Runs that are interrupted or killed.
 
-use crate::workshop::{FIT, NOTHING, Workshop, box_off, files_below};
+use crate::workshop::{FIT, Workshop, box_off, files_below};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -78,45 +78,69 @@ fn a_run_that_cannot_stop_by_itself_is_ended() {
     }
 }
 
-/// Whatever moment a process dies at, what it leaves is whole or not there.
+/// A whole pipeline, from the mesh to STEP, is killed at random moments: on an empty cache, and twice more on what the kills
+/// before have left. A moment is some time after one of the lines it writes, so that it is in the middle of the work however
+/// fast the machine is. Then the next run succeeds, everything is as after a run that was left alone, and
+/// nothing else is there.
 #[cfg(unix)]
 #[test]
 fn killed_runs_leave_nothing_that_misleads_the_next_one() {
-    let names = |shop: &Workshop| -> Vec<PathBuf> {
+    let results = |shop: &Workshop| -> Vec<PathBuf> {
         let root = shop.path(".topipe");
-        ["artifacts-v1", "keys-v1"]
+        ["artifacts-v1", "keys-v1", "units-v1"]
             .iter()
             .flat_map(|bucket| files_below(&root.join(bucket)))
             .map(|file| file.strip_prefix(&root).unwrap().to_owned())
             .collect()
     };
-    let clean = Workshop::new();
-    clean.events(&[]);
-    let shop = Workshop::new();
+    let clean = Workshop::with_part("y-form", FIT);
+    let start = std::time::Instant::now();
+    let lines = clean.topipe(&["run", "box.toml", "--json"]).stdout.lines().count();
+    let between_lines = start.elapsed() / lines as u32;
+    let outputs = |shop: &Workshop| files_below(&shop.path("topipe-out/box")).len();
+    let surface = clean.read("topipe-out/box/part.step");
     // More of them with `just kills`.
-    let rounds = std::env::var("TOPIPE_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(16);
+    let rounds = std::env::var("TOPIPE_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(9);
+    let mut random = 0x9E37_79B9_7F4A_7C15u64;
+    let mut shop = Workshop::with_part("y-form", FIT);
+    let mut in_work = 0;
     for round in 0..rounds {
+        let mut next = |below: u64| {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (random >> 33) % below
+        };
         let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_topipe"))
             .current_dir(shop.folder.path())
-            .args(["-q", "run", "box.toml"])
+            .args(["run", "box.toml", "--json"])
+            .stdout(std::process::Stdio::piped())
             .stderr(std::process::Stdio::null())
             .spawn()
             .unwrap();
-        std::thread::sleep(std::time::Duration::from_micros(1500 * (7 * round % 32)));
+        let mut written = std::io::BufRead::lines(std::io::BufReader::new(child.stdout.take().unwrap()));
+        let until = next(lines as u64);
+        if until > 0 {
+            written.nth(until as usize - 1);
+        }
+        std::thread::sleep(between_lines.mul_f64(next(2000) as f64 / 1000.0));
         child.kill().unwrap();
-        child.wait().unwrap();
+        in_work += usize::from(!child.wait().unwrap().success());
+        if round % 3 != 2 && round + 1 != rounds {
+            continue;
+        }
+        let last = shop.topipe(&["run", "box.toml"]);
+        assert_eq!((last.code, last.stderr.as_str()), (0, ""), "round {round}");
+        for folder in ["locks-v1", "leases-v1", "tmp", "quarantine"] {
+            let left = files_below(&shop.path(".topipe").join(folder));
+            assert_eq!(left, Vec::<PathBuf>::new(), "round {round}");
+        }
+        assert_eq!(results(&shop), results(&clean), "round {round}");
+        assert_eq!(outputs(&shop), outputs(&clean), "round {round}");
+        assert!(shop.read("topipe-out/box/part.step") == surface, "round {round}");
+        assert_eq!(shop.topipe(&["cache", "verify"]).code, 0, "round {round}");
+        shop = Workshop::with_part("y-form", FIT);
     }
-    let last = shop.topipe(&["run", "box.toml"]);
-    for folder in ["locks-v1", "leases-v1", "tmp"] {
-        assert_eq!(files_below(&shop.path(".topipe").join(folder)), Vec::<PathBuf>::new());
-    }
-    let outputs = |shop: &Workshop| files_below(&shop.path("topipe-out/box")).len();
-    assert_eq!(outputs(&shop), outputs(&clean));
-    assert_eq!(last.code, 0, "{}", last.stderr);
-    assert_eq!(names(&shop), names(&clean));
-    assert_eq!(shop.events(&[]), NOTHING);
-    assert_eq!(shop.topipe(&["cache", "verify"]).code, 0);
-    assert_eq!(shop.read("topipe-out/box/report.json"), clean.read("topipe-out/box/report.json"));
+    // One in three begins on an empty cache; a kill on what is nearly done may come too late.
+    assert!(3 * in_work >= rounds, "{in_work} of {rounds} kills met a run in work");
 }
 
 /// Runs until `percent` of the patches are done, sends a signal, and returns how many were.
