@@ -1,4 +1,4 @@
-//! After the last iteration: no spike, no fold, no triangle through another.
+//! After the last iteration: no thread, no spike, no fold, no triangle through another.
 //!
 //! The methods know neither. A spike that stands on frozen vertices stays a spike, a free vertex beside a frozen border
 //! can end up on the wrong side of it, and a thin wall smoothed from both sides can pass through itself. So the result
@@ -12,12 +12,14 @@
 //!   than they took.)
 //! - *Folds*: faces that point against the mean of their neighbours without a spike at their edges are searched in the same way, and
 //!   what is left becomes a membrane (`unfold`).
+//! - *Threads*: spikes and pits that the iteration has drawn out to almost nothing become a membrane on what is around (`threads`).
 //! - *Crossings*: the vertices of triangles that pass through each other, and a ring more in each round, go back half
 //!   of the way to the input, which does not pass through itself. In the end they are there; so this ends.
 //!
 //! Both keep frozen vertices, shapes of regions and the volume.
 
 mod relief;
+mod threads;
 mod unfold;
 
 use crate::SmoothingError;
@@ -63,6 +65,7 @@ pub(crate) struct Finish<'a> {
 /// What was done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Mended {
+    pub(crate) threads: usize,
     pub(crate) spikes_before: usize,
     pub(crate) spikes_after: usize,
     pub(crate) folds_before: usize,
@@ -168,10 +171,15 @@ impl Finish<'_> {
             std::mem::swap(current, &mut next);
             spikes = self.spikes(current);
         }
+        // Not before: steps on spikes draw them out too.
+        mended.threads = self.draw_in_threads(current);
+        if mended.threads > 0 {
+            spikes = self.spikes(current);
+        }
         if !spikes.is_empty() {
             self.relieve(current, &self.around_spikes(&spikes), self.spike);
         }
-        if mended.spikes_before > 0 {
+        if mended.spikes_before + mended.threads > 0 {
             self.restore(current, keeper);
         }
         Ok(())

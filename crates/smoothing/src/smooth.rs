@@ -294,8 +294,9 @@ fn iterate(
         let mended = finish.mend(&mut current, progress)?;
         if mended != Mended::default() {
             progress.remark(&format!(
-                "{} edges were sharper than `spike_angle`, {} still are; {} faces pointed against their neighbours, {} still \
+                "{} threads were drawn in; {} edges were sharper than `spike_angle`, {} still are; {} faces pointed against their neighbours, {} still \
                  do; {} pairs of triangles passed through each other and were parted",
+                mended.threads,
                 mended.spikes_before,
                 mended.spikes_after,
                 mended.folds_before,

@@ -126,10 +126,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     jumps.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mesh = surface.tessellate(2e-3 * layout.part.mesh.diagonal());
-    println!(
-        "triangulated, it passes through itself in {} places",
-        topipe_mesh::spatial::crossings(&mesh).len()
-    );
+    let crossings = topipe_mesh::spatial::crossings(&mesh);
+    println!("triangulated, it passes through itself in {} places", crossings.len());
+    for crossing in &crossings {
+        println!("  crossing at {:.1} {:.1} {:.1}", crossing.point.x, crossing.point.y, crossing.point.z);
+    }
     let above = |limit: f64| jumps.iter().filter(|j| j.0 > limit).count();
     println!(
         "{} smooth edges; above 0.1 degrees: {}, 1: {}, 10: {}, 90: {}; median {:.4}",

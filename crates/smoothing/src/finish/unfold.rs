@@ -39,7 +39,7 @@ impl Finish<'_> {
             .collect()
     }
 
-    fn normal(&self, positions: &[DVec3], face: FaceId) -> DVec3 {
+    pub(super) fn normal(&self, positions: &[DVec3], face: FaceId) -> DVec3 {
         let [a, b, c] = self.mesh.triangles[face.index()].map(|v| positions[v.index()]);
         (b - a).cross(c - a).normalize_or_zero()
     }
@@ -56,7 +56,7 @@ impl Finish<'_> {
     pub(super) fn unfold(&self, positions: &mut [DVec3], mut folds: Vec<FaceId>) -> usize {
         for limit in LIMITS {
             folds.retain(|&fold| {
-                let around = self.around(fold, 1);
+                let around = self.around(&[fold], 1);
                 !self.attempt(positions, fold, &around, |positions| {
                     self.relieve(positions, &around, limit.to_radians().cos());
                 })
@@ -64,7 +64,7 @@ impl Finish<'_> {
         }
         // A vertex of three faces that stands out is laid among its neighbours.
         folds.retain(|&fold| {
-            let mut own = self.around(fold, 0);
+            let mut own = self.around(&[fold], 0);
             own.sort_by_key(|&v| self.domain.row(v).len());
             !own.into_iter().any(|v| {
                 self.attempt(positions, fold, &[v], |positions| {
@@ -75,7 +75,7 @@ impl Finish<'_> {
         for rings in 0..=RINGS {
             for steps in STEPS {
                 folds.retain(|&fold| {
-                    let around = self.around(fold, rings);
+                    let around = self.around(&[fold], rings);
                     !self.attempt(positions, fold, &around, |positions| {
                         for _ in 0..steps {
                             // One after the other, as each is better with its neighbours' new places.
@@ -90,7 +90,7 @@ impl Finish<'_> {
         // Last what slides on the shape of a region, on that shape.
         for limit in LIMITS {
             folds.retain(|&fold| {
-                let around = self.within(fold, 1);
+                let around = self.within(&[fold], 1);
                 !self.attempt(positions, fold, &around, |positions| {
                     self.relieve(positions, &around, limit.to_radians().cos());
                 })
@@ -138,7 +138,7 @@ impl Finish<'_> {
     }
 
     /// The cosine of the largest angle at an edge of `faces`.
-    fn sharpest(&self, positions: &[DVec3], faces: &[FaceId]) -> f64 {
+    pub(super) fn sharpest(&self, positions: &[DVec3], faces: &[FaceId]) -> f64 {
         let cosine = |f: FaceId, k: usize| {
             let g = self.connectivity.neighbor(f, k);
             if g.is_some() { self.normal(positions, f).dot(self.normal(positions, g)) } else { 1.0 }
@@ -147,7 +147,7 @@ impl Finish<'_> {
     }
 
     /// Pairs of triangles that pass through each other around `vertices`.
-    fn crossings_near(&self, positions: &[DVec3], vertices: &[usize]) -> usize {
+    pub(super) fn crossings_near(&self, positions: &[DVec3], vertices: &[usize]) -> usize {
         let reach = DVec3::splat(self.edge);
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for h in vertices.iter().flat_map(|&v| self.connectivity.outgoing(VertexId::new(v))) {
@@ -170,17 +170,17 @@ impl Finish<'_> {
         crossings(&TriangleMesh { positions, triangles }).len()
     }
 
-    /// The vertices that may move freely up to `rings` rings from those of `face`, in order.
-    fn around(&self, face: FaceId, rings: usize) -> Vec<usize> {
-        let mut found = self.within(face, rings);
+    /// The vertices that may move freely up to `rings` rings from those of `faces`, in order.
+    pub(super) fn around(&self, faces: &[FaceId], rings: usize) -> Vec<usize> {
+        let mut found = self.within(faces, rings);
         found.retain(|&v| !self.slides[v]);
         found
     }
 
-    /// The vertices that may move at all up to `rings` rings from those of `face`, in order.
-    fn within(&self, face: FaceId, rings: usize) -> Vec<usize> {
+    /// The vertices that may move at all up to `rings` rings from those of `faces`, in order.
+    fn within(&self, faces: &[FaceId], rings: usize) -> Vec<usize> {
         let c = self.connectivity;
-        let mut found: Vec<VertexId> = self.mesh.triangles[face.index()].to_vec();
+        let mut found: Vec<VertexId> = faces.iter().flat_map(|f| self.mesh.triangles[f.index()]).collect();
         for _ in 0..rings {
             let ring: Vec<VertexId> =
                 found.iter().flat_map(|&v| c.outgoing(v)).map(|h| c.target(h)).collect();

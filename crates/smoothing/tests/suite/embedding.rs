@@ -1,8 +1,8 @@
-//! No spike, no fold, no triangle through another.
+//! No thread, no spike, no fold, no triangle through another.
 
 use crate::{CASES, read, smoothed};
 use topipe_mesh::spatial::crossings;
-use topipe_mesh::{Connectivity, DVec3, FaceId, Part, TriangleMesh};
+use topipe_mesh::{Connectivity, DVec3, FaceId, Part, TriangleMesh, VertexId};
 use topipe_smoothing::{Method, Parameters};
 
 /// Edges with a dihedral angle of more than 120 degrees, and the largest angle.
@@ -65,6 +65,35 @@ fn crossings_go_back_towards_the_input_until_there_is_none() {
     let moved =
         |a: &Part, b: &Part| a.mesh.positions.iter().zip(&b.mesh.positions).filter(|(p, q)| p != q).count();
     assert!(moved(&torn, &whole) > 0);
+}
+
+/// Vertices whose faces have all shrunk to less than a quarter of their lengths and turn around something.
+fn threads(before: &TriangleMesh, after: &TriangleMesh) -> usize {
+    let connectivity = Connectivity::build(after).expect("a manifold");
+    let longest = |mesh: &TriangleMesh, f: FaceId| {
+        let [a, b, c] = mesh.corners(f);
+        a.distance(b).max(b.distance(c)).max(c.distance(a))
+    };
+    let is_thread = |v: &VertexId| {
+        let star: Vec<FaceId> = connectivity.outgoing(*v).map(|h| h.face()).collect();
+        let normals: Vec<DVec3> = star.iter().map(|f| after.normal(*f)).collect();
+        star.iter().all(|f| longest(after, *f) < 0.25 * longest(before, *f))
+            && normals.iter().any(|n| normals.iter().any(|m| n.dot(*m) < 0.0))
+    };
+    (0..after.vertex_count()).map(VertexId::new).filter(is_thread).count()
+}
+
+#[test]
+fn threads_are_drawn_in() {
+    for case in CASES {
+        let part = read(case);
+        let result = smoothed(&part, &Parameters::default());
+        assert_eq!(threads(&part.mesh, &result.mesh), 0, "{case}");
+        if case == "bracket" {
+            let left = smoothed(&part, &Parameters { spike_angle: 180.0, ..Parameters::default() });
+            assert!(threads(&part.mesh, &left.mesh) > 0);
+        }
+    }
 }
 
 #[test]
