@@ -3,6 +3,7 @@
 use crate::{Basis, SplineFitError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use topipe_mesh::TriangleMesh;
 
 /// How patches meet along edges that are not features.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
@@ -37,7 +38,9 @@ pub struct Parameters {
     pub degree: u32,
     /// Interior knots in both directions, each in (0, 1), in order (source, section 3: 1/3, 2/3).
     pub interior_knots: Vec<f64>,
-    /// Weight of the distance to the mesh against the bending energy, in (0, 1] (source, section 2.3).
+    /// Weight of the distance to the mesh against the bending energy, in (0, 1] (source, section 2.3). With common tangents the
+    /// bending energy of a patch counts less, down to a thousandth, where the patch is not within the tolerance, and more where
+    /// it would fold.
     pub lambda: f64,
     /// Rounds in which the parameters of the mesh points are moved to the foot points on the last fit.
     pub foot_point_rounds: u32,
@@ -75,6 +78,18 @@ impl Default for Parameters {
 }
 
 impl Parameters {
+    /// The narrower of both tolerances, mm.
+    pub(crate) fn largest_distance(&self, mesh: &TriangleMesh) -> f64 {
+        (self.tolerance * mesh.diagonal()).min(self.tolerance_mm.unwrap_or(f64::INFINITY))
+    }
+
+    /// The same for a patch on its own, with seven significant bits: an edit that changes the diagonal a little leaves the keys of
+    /// patches that it does not touch.
+    pub(crate) fn largest_distance_of_patch(&self, mesh: &TriangleMesh) -> f64 {
+        let kept = f64::MANTISSA_DIGITS - 7;
+        f64::from_bits(self.largest_distance(mesh).to_bits() >> kept << kept)
+    }
+
     /// Checks the ranges; returns the basis they describe.
     pub fn basis(&self) -> Result<Basis, SplineFitError> {
         let refuse = |field, value: String, range| Err(SplineFitError::Parameter { field, value, range });

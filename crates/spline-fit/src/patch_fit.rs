@@ -48,6 +48,12 @@ impl Net {
         folded as f64 / ((nu + 1) * (nv + 1)) as f64
     }
 
+    /// The largest distance of a sample from the point with its parameters, mm.
+    pub(crate) fn farthest(&self, samples: &PatchSamples) -> f64 {
+        let off = samples.samples.iter().map(|s| self.evaluate(s.u, s.v).position.distance(s.point));
+        off.fold(0.0, f64::max)
+    }
+
     pub(crate) fn evaluate(&self, u: f64, v: f64) -> SurfacePoint {
         let width = self.basis_u.len();
         let (i, bu, su) = hermite::local(width / 2 - 1, u);

@@ -26,8 +26,7 @@ impl Refinement {
         Self {
             spans: vec![parameters.spans as usize; setting.layout.edges.len()],
             left: parameters.refinements,
-            tolerance: (parameters.tolerance * setting.layout.part.mesh.diagonal())
-                .min(parameters.tolerance_mm.unwrap_or(f64::INFINITY)),
+            tolerance: parameters.largest_distance(&setting.layout.part.mesh),
         }
     }
 
@@ -44,15 +43,8 @@ impl Refinement {
         samples: &[PatchSamples],
         progress: &Progress,
     ) -> bool {
-        let residuals: Vec<f64> = samples
-            .par_iter()
-            .zip(fitted)
-            .map(|(samples, fitted)| {
-                let off =
-                    samples.samples.iter().map(|s| fitted.net.evaluate(s.u, s.v).position.distance(s.point));
-                off.fold(0.0, f64::max)
-            })
-            .collect();
+        let residuals: Vec<f64> =
+            samples.par_iter().zip(fitted).map(|(samples, fitted)| fitted.net.farthest(samples)).collect();
         progress.remark(&format!(
             "distance at most {:.3e} mm, on {} of {} patches above {:.3e}",
             residuals.iter().fold(0.0f64, |a, &b| a.max(b)),
