@@ -153,6 +153,7 @@ impl Pipeline {
             Some(table) => {
                 let (drafts, figures) = sweep::read(&source, table)?;
                 // What the command line says has the last word.
+                let drafts = sweep::overridden(drafts, overrides);
                 let all = |draft: &sweep::Draft| {
                     resolve(&draft.overrides().chain(&text_overrides).cloned().collect::<Vec<_>>())
                 };

@@ -57,6 +57,20 @@ pub(super) struct Sourced {
 }
 
 impl Override {
+    /// `STAGE.FIELD`.
+    pub(super) fn name(&self) -> String {
+        format!("{}.{}", self.stage, self.field)
+    }
+
+    /// The value as people read it: a string without its quotes.
+    pub(super) fn plain_value(&self) -> String {
+        let entry = format!("value = {}", self.value);
+        let string = DeTable::parse(&entry)
+            .ok()
+            .and_then(|table| table.get_ref().get("value")?.get_ref().as_str().map(str::to_owned));
+        string.unwrap_or_else(|| self.value.clone())
+    }
+
     pub(super) fn sourced(&self) -> Sourced {
         let front = format!("--set {}.", self.stage);
         let with = |value: &str| {

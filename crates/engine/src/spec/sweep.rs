@@ -11,7 +11,7 @@
 //! Where several of the three are given, all their combinations are made. The variants become one graph: stages that are
 //! the same in several variants are one stage, so that what they share is computed once and everything runs side by side.
 
-use super::overrides::Sourced;
+use super::overrides::{Override, Sourced};
 use super::stages::PlacedStage;
 use super::{Checked, ExportNode, string, table};
 use crate::diagnostic::{Diagnostic, Source};
@@ -111,13 +111,32 @@ pub(super) fn read(source: &Arc<Source>, sweep: &Spanned<DeValue<'_>>) -> Checke
     }
     let mut drafts = vec![Draft::default()];
     for part in &parts {
-        drafts = drafts.iter().flat_map(|draft| part.iter().map(|next| draft.joined(next))).collect();
-        if drafts.len() > MOST {
+        if drafts.len().saturating_mul(part.len()) > MOST {
             let message = format!("the sweep has more than {MOST} variants");
             return Err(Box::new(Diagnostic::new(source, sweep.span(), message)));
         }
+        drafts = drafts.iter().flat_map(|draft| part.iter().map(|next| draft.joined(next))).collect();
     }
     Ok((drafts, figures))
+}
+
+/// The variants with what the command line says in place of swept values, so that names and table say what was run. Those that
+/// no longer differ are one.
+pub(super) fn overridden(mut drafts: Vec<Draft>, overrides: &[Override]) -> Vec<Draft> {
+    for over in overrides {
+        let (field, value) = (over.name(), over.plain_value());
+        for setting in drafts.iter_mut().flat_map(|draft| &mut draft.settings) {
+            if setting.field == field {
+                setting.value.clone_from(&value);
+            }
+        }
+    }
+    let mut seen = BTreeSet::new();
+    drafts.retain(|draft| {
+        let values = draft.settings.iter().map(|setting| (setting.field.clone(), setting.value.clone()));
+        seen.insert((draft.name.clone(), values.collect::<Vec<_>>()))
+    });
+    drafts
 }
 
 fn list<'t, 's>(

@@ -114,6 +114,11 @@ fn the_command_line_has_the_last_word() {
     );
     let started = log.iter().filter(|line| line.starts_with("soft") && line.contains("starts")).count();
     assert_eq!(started, 1, "{log:#?}");
+    // Nothing is called by a value that it does not have, and what no longer differs is one.
+    let pipeline = shop.pipeline(&["soft.suffix=\"x\""]);
+    let names: Vec<&str> =
+        pipeline.sweep.as_ref().unwrap().variants.iter().map(|variant| variant.name.as_str()).collect();
+    assert_eq!(names, ["suffix=x"]);
 }
 
 fn error(sweep: &str) -> String {
