@@ -41,7 +41,8 @@ fn run(command: &mut Command) -> Result<String, String> {
 }
 
 fn import_packages(python: &Path) -> Result<(), String> {
-    let imports = "import OCP.STEPControl, gmsh, trimesh, scipy, rtree, networkx, pyvista, playwright, PIL";
+    let imports =
+        "import OCP.STEPControl, gmsh, trimesh, scipy, rtree, networkx, pyvista, playwright, websockets, PIL";
     run(Command::new(python).args(["-c", imports])).map(|_| ())
 }
 
@@ -309,8 +310,44 @@ fn the_report_opens_in_a_browser() {
     // But for the outline around what has the focus.
     assert!(number(&found, "/back_share") < 0.02, "key 1 is the first view");
     assert!(number(&found, "/zoomed_share") > 0.02);
+    // Where the processor draws, the model turns with fewer pixels and triangles; at rest everything is there again.
+    assert!(number(&found, "/turning/triangles") <= 128_000.0, "{}", found["turning"]);
+    assert!(
+        number(&found, "/turning/canvas/0") < 0.6 * number(&found, "/turning/rest/0"),
+        "{}",
+        found["turning"]
+    );
+    assert!(number(&found, "/turned_back_share") < 0.02, "after turning the picture is the same");
     assert_eq!(found["marker"], 1, "a place is marked");
     assert!(found["tip"].as_str().unwrap().contains("mm"), "what is under the pointer is told");
+}
+
+#[test]
+fn the_report_opens_in_firefox_with_and_without_webgl() {
+    let Some(python) = clients() else { return };
+    let folder = run_pipeline_with("y-form", true, "\"report.html\" = \"check\"\n");
+    let found = check(python, "check_report_firefox.py", &["report.html"], folder.path());
+    println!("{found:#}");
+    if let Some(reason) = found["skipped"].as_str() {
+        println!("SKIPPED: {reason}");
+        return;
+    }
+    // Headless Firefox has no WebGL 2: the page says what to do, and the rest of it is there.
+    let without = &found["without"];
+    assert_eq!(without["viewer"], "failed");
+    assert!(without["note"].as_str().unwrap().contains("graphics acceleration"));
+    assert!(number(without, "/pictures") >= 5.0);
+    for (how, page) in found.as_object().unwrap() {
+        assert_eq!(page["messages"], Value::Array(vec![]), "messages in the console, {how}");
+        assert_eq!(page["requests"], Value::Array(vec![]), "requests, {how}");
+        assert!(number(page, "/figures") > 80.0);
+    }
+    let Some(with) = found.get("with") else { return println!("SKIPPED: no xvfb-run for a display") };
+    assert_eq!(with["viewer"], "ready");
+    for (preset, share) in with["presets"].as_object().unwrap() {
+        assert!(share.as_f64().unwrap() > 0.02, "{preset} shows nothing");
+    }
+    assert!(number(with, "/cut_share") > 0.02 && number(with, "/turned_share") > 0.02);
 }
 
 #[test]

@@ -43,6 +43,22 @@ CONTRAST = """() => {
   return worst;
 }"""
 
+# Two seconds of turning: frames a second, and what they are drawn with.
+TURNING = """async () => {
+  let frames = 0;
+  const update = topipe.annotations.update;
+  topipe.annotations.update = function () { frames++; update.call(this); };
+  const end = performance.now() + 2000;
+  while (performance.now() < end) {
+    topipe.camera.turn(1.5, 0);
+    topipe.moving();
+    await new Promise((next) => requestAnimationFrame(next));
+  }
+  delete topipe.annotations.update;
+  const { canvas } = topipe;
+  return { fps: frames / 2, triangles: topipe.budget, of: topipe.renderer.triangles(topipe.view(1)), canvas: [canvas.width, canvas.height] };
+}"""
+
 NAMELESS = """() => [...document.querySelectorAll('button, input, select, canvas, a[href], [role=img], [role=region]')]
   .filter((n) => n.checkVisibility() && !(n.getAttribute('aria-label') || n.textContent.trim() || n.labels?.length || n.title))
   .map((n) => n.outerHTML.slice(0, 80))"""
@@ -60,11 +76,12 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("report", type=Path)
     parser.add_argument("--screenshots", type=Path)
+    parser.add_argument("--flag", action="append", default=[], help="one more for Chromium, as --flag=--disable-gpu-compositing")
     arguments = parser.parse_args()
     found = {"messages": [], "requests": [], "screenshots": {}}
 
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=browser_path(), args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=browser_path(), args=FLAGS + arguments.flag)
         found["browser"] = browser.version
         page = browser.new_page(viewport={"width": 960, "height": 640})
         page.on("console", lambda m: found["messages"].append(f"{m.type}: {m.text}"))
@@ -72,13 +89,15 @@ def main():
         page.on("request", lambda r: found["requests"].append(r.url[:120]))
         address = arguments.report.resolve().as_uri()
         page.goto(address)
-        page.wait_for_function("document.documentElement.dataset.viewer", timeout=60000)
+        drawn = lambda: page.wait_for_selector("html[data-viewer=ready], html[data-viewer=failed]", state="attached", timeout=60000)
+        drawn()
         found["viewer"] = page.evaluate("document.documentElement.dataset.viewer")
         found["title"] = page.title()
         canvas = page.locator("canvas")
 
         def look(name=None):
             """The canvas as an image, once everything asked for is drawn."""
+            drawn()
             page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
             image = Image.open(io.BytesIO(canvas.screenshot())).convert("RGB")
             if name and arguments.screenshots:
@@ -147,6 +166,12 @@ def main():
             canvas.press("+")
             found["zoomed_share"] = share(look(), whole)
             canvas.press("f")
+            drawn()
+            found["turning"] = page.evaluate(TURNING)
+            drawn()
+            found["turning"]["rest"] = page.evaluate("[topipe.canvas.width, topipe.canvas.height]")
+            canvas.press("1")
+            found["turned_back_share"] = share(look(), whole)
             place = page.locator("button.place").first
             if place.count():
                 place.click()

@@ -18,6 +18,7 @@ fn skeleton(nodes: &[(DVec3, PointKind)], bars: &[(usize, usize, f64)], count: u
         kinds: nodes.iter().map(|n| n.1).collect(),
         sections: vec![Section::None; nodes.len()],
         edges: Vec::new(),
+        non_design_holes: 0,
         remarks: Vec::new(),
     };
     for &(a, b, radius) in bars {
@@ -112,6 +113,7 @@ fn rings_and_twins_are_divided_so_that_no_loop_is_lost() {
         kinds: vec![PointKind::Branch; 24],
         sections: vec![disc; 24],
         edges: (0..24u32).map(|k| [k.min((k + 1) % 24), k.max((k + 1) % 24)]).collect(),
+        non_design_holes: 0,
         remarks: Vec::new(),
     };
     for axis in [AxisForm::Straight, AxisForm::Spline] {

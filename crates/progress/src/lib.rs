@@ -13,10 +13,14 @@
 //! }
 //! ```
 //!
+//! [`number`], [`duration`] and [`size`] write quantities as people read them.
+//!
 //! Nothing that passes through a [`Progress`] may reach an artifact: progress is for people, results are not.
 
+mod quantities;
 mod units;
 
+pub use quantities::{duration, number, size};
 pub use units::{UnitKey, UnitKeyHasher, UnitStore, Units};
 
 use std::fmt;

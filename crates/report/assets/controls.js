@@ -155,7 +155,7 @@ class Controls {
         oninput: (e) => {
           viewer.cut.at = Number(e.target.value);
           text.textContent = `${figure(viewer.cut.at)} mm`;
-          viewer.request();
+          viewer.moving();
         },
       });
       const flip = element('input', { type: 'checkbox', checked: viewer.cut.flip, onchange: (e) => { viewer.cut.flip = e.target.checked; viewer.request(); } });

@@ -74,42 +74,6 @@ function splitVertices(points, triangles, creaseDegrees, idOfFace) {
   };
 }
 
-/**
- * Fewer triangles on the same vertices, about `wanted`: those that are left where all vertices of a group in a cell of a grid
- * become the first of them.
- */
-function coarsened(index, places, group, wanted) {
-  let area = 0;
-  const low = [Infinity, Infinity, Infinity];
-  const high = [-Infinity, -Infinity, -Infinity];
-  for (let t = 0; t < index.length; t += 3) {
-    const [a, b, c] = [3 * index[t], 3 * index[t + 1], 3 * index[t + 2]];
-    const [ux, uy, uz] = [places[b] - places[a], places[b + 1] - places[a + 1], places[b + 2] - places[a + 2]];
-    const [vx, vy, vz] = [places[c] - places[a], places[c + 1] - places[a + 1], places[c + 2] - places[a + 2]];
-    area += Math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx) / 2;
-  }
-  for (let i = 0; i < places.length; i++) {
-    low[i % 3] = Math.min(low[i % 3], places[i]);
-    high[i % 3] = Math.max(high[i % 3], places[i]);
-  }
-  const cell = Math.sqrt((2 * area) / wanted);
-  const cells = [0, 1, 2].map((k) => Math.floor((high[k] - low[k]) / cell) + 1);
-  const first = new Map();
-  const instead = new Uint32Array(places.length / 3);
-  for (let v = 0; v < instead.length; v++) {
-    const [x, y, z] = [0, 1, 2].map((k) => Math.floor((places[3 * v + k] - low[k]) / cell));
-    const key = ((group[v] * cells[0] + x) * cells[1] + y) * cells[2] + z;
-    if (!first.has(key)) first.set(key, v);
-    instead[v] = first.get(key);
-  }
-  const kept = [];
-  for (let t = 0; t < index.length; t += 3) {
-    const [a, b, c] = [instead[index[t]], instead[index[t + 1]], instead[index[t + 2]]];
-    if (a !== b && b !== c && c !== a) kept.push(a, b, c);
-  }
-  return Uint32Array.from(kept);
-}
-
 /** Where a line towards the viewer meets a mesh first. Ends and direction in mm; `keep` says which points are there. */
 function pick(points, triangles, origin, axes, keep) {
   const [right, up, back] = axes;

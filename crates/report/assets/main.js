@@ -1,8 +1,13 @@
-// The viewer: state, input, and what is written over the canvas.
+// The viewer: state, input, and when it is drawn.
 
-/** A frame of more milliseconds is slow; after one of fewer, the next motion is tried with less of a hurry. */
-const SLOW = 45;
-const QUICK = 8;
+/** A frame of more milliseconds is slow: with what the page needs beside it there would be fewer than 30 a second. */
+const SLOW = 26;
+/** After a motion whose frames took fewer, the next one is drawn with more triangles. */
+const QUICK = 9;
+/** What a processor that draws is given at first, triangles. */
+const SOFTWARE_BUDGET = 16000;
+/** Pixels of the canvas per pixel of the screen while a slow card turns the model. */
+const MOVING_SCALE = 0.5;
 
 class Viewer {
   constructor(host, header, bytes) {
@@ -17,18 +22,21 @@ class Viewer {
     this.active = 0;
     this.preset = '';
     this.marker = null;
-    this.ratio = 1;
-    /** How much of a hurry turning the model was the last time. */
-    this.slow = 0;
-    this.lastFrame = 0;
+    /** So many triangles are drawn while the model moves; finite on a slow card, which draws fewer pixels then too. */
+    this.budget = Infinity;
+    /** The most the budget is raised to: more turned out to be slow. */
+    this.ceiling = Infinity;
+    /** Times of the frames of this motion, ms. */
+    this.frames = [];
 
     this.canvas = element('canvas', { tabindex: '0', role: 'application', 'aria-roledescription': 'three-dimensional view',
       'aria-label': 'Model. Arrow keys turn it, plus and minus zoom, 1 to 7 choose a view, F fits, S cuts it open.' });
-    this.overlay = element('div', { class: 'overlay' });
+    this.annotations = new Annotations(this);
     this.tip = element('div', { class: 'tip', hidden: true });
     this.status = element('div', { class: 'hidden', role: 'status', 'aria-live': 'polite' });
-    this.stage = element('div', { class: 'stage' }, this.canvas, this.overlay, this.tip, this.status);
+    this.stage = element('div', { class: 'stage' }, this.canvas, this.annotations.root, this.tip, this.status);
     this.renderer = new Renderer(this.canvas, header, bytes);
+    if (this.renderer.isSoftware()) this.budget = SOFTWARE_BUDGET;
     this.controls = new Controls(this);
     host.replaceChildren(this.controls.root, this.stage);
     this.listen();
@@ -39,7 +47,6 @@ class Viewer {
       for (const id of Object.keys(this.panes[0].overlays)) this.panes[0].overlays[id] = true;
       this.controls.build();
     }
-    this.resize();
     this.fit();
   }
 
@@ -178,7 +185,16 @@ class Viewer {
       this.moving();
     }, { passive: false });
     canvas.addEventListener('keydown', (e) => this.key(e));
-    new ResizeObserver(() => this.resize()).observe(this.stage);
+    canvas.addEventListener('webglcontextlost', (e) => {
+      e.preventDefault();
+      this.steps = null;
+      this.say('The graphics card was taken away; the model is drawn again once it is back.');
+    });
+    canvas.addEventListener('webglcontextrestored', () => {
+      this.renderer = new Renderer(canvas, this.header, this.renderer.bytes);
+      this.request();
+    });
+    new ResizeObserver(() => this.refit()).observe(this.stage);
     document.addEventListener('click', (e) => {
       const button = e.target.closest('button.place');
       if (button) this.show(button.dataset.at.split(',').map(Number));
@@ -204,7 +220,7 @@ class Viewer {
     } else if (view) this.look(view[1], view[2]);
     else return;
     e.preventDefault();
-    this.request();
+    this.moving();
   }
 
   /** What is under the pointer once it rests. */
@@ -259,19 +275,19 @@ class Viewer {
     return [...this.cut.normal.map((n) => sign * n), sign * this.cut.at];
   }
 
-  resize() {
-    const { clientWidth: width, clientHeight: height } = this.stage;
-    const ratio = Math.min(window.devicePixelRatio || 1, 2) * this.ratio;
-    const size = [Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio))];
-    if (this.canvas.width !== size[0] || this.canvas.height !== size[1]) {
-      [this.canvas.width, this.canvas.height] = size;
-      this.refit();
-    }
+  /** What is to be seen, with `scale` pixels of the canvas per pixel of the screen. */
+  view(scale) {
+    const { clientWidth, clientHeight } = this.stage;
+    const ratio = Math.min(window.devicePixelRatio || 1, 2) * scale;
+    return {
+      panes: this.panes, camera: this.camera, ranges: this.ranges, plane: this.plane(), ratio,
+      width: Math.max(1, Math.round(clientWidth * ratio)), height: Math.max(1, Math.round(clientHeight * ratio)),
+    };
   }
 
   /** The model moves, until nothing has moved it for a while. */
   moving() {
-    if (!this.inMotion) this.hurry(this.slow);
+    if (!this.inMotion) this.frames = [];
     this.inMotion = true;
     this.request();
   }
@@ -281,43 +297,96 @@ class Viewer {
     clearTimeout(this.settling);
     this.settling = setTimeout(() => {
       this.inMotion = false;
-      if (this.lastFrame < QUICK) this.slow = Math.max(this.slow - 1, 0);
-      this.hurry(0);
+      this.moreOfIt();
       this.request();
     }, 250);
   }
 
-  /** A slow card draws fewer pixels, fewer triangles and thin lines while the model moves. */
-  hurry(level) {
-    if (this.renderer.hurry === level) return;
-    this.renderer.hurry = level;
-    this.ratio = level ? 0.5 : 1;
-    this.resize();
-  }
-
   request() {
+    document.documentElement.dataset.viewer = 'drawing';
+    this.steps = null;
     this.frame ??= requestAnimationFrame(() => {
       this.frame = null;
-      this.draw();
+      if (this.inMotion) this.drawMoving();
+      else if (this.budget === Infinity) this.draw();
+      else this.drawSlowly();
     });
   }
 
+  /** At once, and well. */
   draw() {
-    this.renderer.plane = this.plane();
-    const ratio = this.canvas.width / Math.max(this.canvas.clientWidth, 1);
-    const begun = performance.now();
-    this.renderer.draw(this.panes, this.camera, this.ranges, ratio);
-    if (this.inMotion) {
-      // Reading a pixel waits for the card: only so its time is known, and frames do not pile up.
-      const { gl } = this.renderer;
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
-      this.lastFrame = performance.now() - begun;
-      if (this.lastFrame > SLOW && !this.renderer.prepared) this.hurry((this.slow = Math.min(this.renderer.hurry + 1, 2)));
-      this.settle();
-    }
-    this.renderer.prepared = false;
-    this.annotate();
+    this.steps = null;
+    for (const _ of this.renderer.drawWell(this.view(1))) continue;
+    this.atRest();
+  }
+
+  atRest() {
+    this.annotations.update();
     document.documentElement.dataset.viewer = 'ready';
+  }
+
+  drawMoving() {
+    // Frames must not pile up.
+    if (this.busy) {
+      this.late = true;
+      return;
+    }
+    const quick = this.budget < Infinity;
+    const view = this.view(quick ? MOVING_SCALE : 1);
+    const { renderer } = this;
+    const { made } = renderer;
+    if (quick) renderer.drawQuickly(view, this.budget);
+    else for (const _ of renderer.drawWell(view)) continue;
+    this.annotations.update();
+    this.busy = true;
+    renderer.whenDrawn((time) => {
+      this.busy = false;
+      // What had to be made first says nothing of the next frame.
+      if (renderer.made === made) {
+        this.frames.push(time);
+        this.lessOfIt(view);
+      }
+      if (this.late) this.request();
+      this.late = false;
+      this.settle();
+    });
+  }
+
+  /** Fewer triangles where two frames in succession were slow: a single one may be the fault of something else. */
+  lessOfIt(view) {
+    const time = Math.min(...this.frames.slice(-2));
+    if (this.frames.length < 2 || time <= SLOW) return;
+    const all = this.renderer.triangles(view);
+    // Fewer pixels and samples are worth a factor of about four.
+    const wanted = this.budget < Infinity ? (Math.min(this.budget, all) * SLOW) / time : (all * 4 * SLOW) / time;
+    if (this.raised) this.ceiling = this.raised;
+    this.budget = LADDER.findLast((n) => n <= wanted) ?? LADDER[0];
+    this.frames = [];
+  }
+
+  /** More triangles the next time where all frames were quick. */
+  moreOfIt() {
+    this.raised = null;
+    if (this.frames.length < 4 || this.budget >= this.ceiling || Math.max(...this.frames.slice(-8)) > QUICK) return;
+    this.raised = this.budget;
+    this.budget = this.budget < this.renderer.triangles(this.view(1)) ? LADDER.find((n) => n > this.budget) ?? Infinity : Infinity;
+  }
+
+  /** On a slow card: fast at first, then piece by piece as well as can be, until something else is asked for. */
+  drawSlowly() {
+    this.renderer.drawQuickly(this.view(MOVING_SCALE), this.budget);
+    this.annotations.update();
+    const steps = this.renderer.drawWell(this.view(1));
+    this.steps = steps;
+    const step = () => {
+      if (this.steps !== steps) return;
+      if (!steps.next().done) this.renderer.whenDrawn(step);
+      else {
+        this.steps = null;
+        this.atRest();
+      }
+    };
+    this.renderer.whenDrawn(step);
   }
 
   /** Where a point of the world is on the canvas, in pixels of CSS. */
@@ -326,114 +395,6 @@ class Viewer {
     const { clientWidth: width, clientHeight: height } = this.stage;
     const w = width / this.panes.length;
     return [pane * w + w / 2 + (x * height) / 2, height / 2 - (y * height) / 2];
-  }
-
-  annotate() {
-    const nodes = [];
-    const width = this.stage.clientWidth / this.panes.length;
-    const at = (node, x, y) => {
-      node.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
-      nodes.push(node);
-    };
-    this.panes.forEach((pane, k) => {
-      const inside = ([x, y]) => x > k * width && x < (k + 1) * width && y > 0 && y < this.stage.clientHeight;
-      const plane = this.plane();
-      if (pane.labels) {
-        for (const label of this.header.labels) {
-          const place = this.place(label.at, k);
-          if (inside(place) && (!plane || dot(label.at, plane) <= plane[3])) at(element('span', { class: 'label' }, label.text), ...place);
-        }
-      }
-      if (this.marker) {
-        const place = this.place(this.marker, k);
-        if (inside(place)) at(element('span', { class: 'marker' }), ...place);
-      }
-      const shown = this.header.surfaces.filter((s) => pane.surfaces[s.id].on);
-      const overlays = [...this.header.lines, ...this.header.points].filter((l) => pane.overlays[l.id]);
-      const names = [...shown, ...overlays].map((l) => l.name).join(', ') || 'nothing is shown';
-      const title = element('div', { class: `title${this.panes.length > 1 && k === this.active ? ' active' : ''}` }, names);
-      title.style.maxWidth = `${width - 28}px`;
-      at(title, k * width + 12, 10);
-      if (k) at(element('div', { class: 'divider' }), k * width - 1, 0);
-      this.legends(pane, shown, k * width + 12, width);
-    });
-    this.scaleBar(at);
-    this.triad(at);
-    this.overlay.replaceChildren(...nodes, ...this.legendNodes());
-  }
-
-  legends(pane, shown, left, width) {
-    const fields = shown.filter((s) => pane.surfaces[s.id].color[0] === 'f').map((s) => s.fields[Number(pane.surfaces[s.id].color.slice(1))]);
-    fields.push(...this.header.lines.filter((l) => l.field && pane.overlays[l.id]).map((l) => l.field));
-    this.wanted ??= [];
-    fields.forEach((field, k) => this.wanted.push({ field, right: left - 12 + width - 14, bottom: 14 + 74 * k }));
-  }
-
-  /** Legends are kept while they are the same, so that a value can be typed into them. */
-  legendNodes() {
-    const wanted = this.wanted ?? [];
-    this.wanted = [];
-    this.legendsBy ??= new Map();
-    const kept = new Map();
-    const nodes = wanted.map(({ field, right, bottom }, k) => {
-      const key = `${field.name} ${k}`;
-      const node = this.legendsBy.get(key)?.field === field ? this.legendsBy.get(key).node : this.legend(field);
-      kept.set(key, { field, node });
-      node.style.right = `${this.stage.clientWidth - right}px`;
-      node.style.bottom = `${bottom}px`;
-      const range = this.ranges.get(field);
-      const low = field.diverging ? -range : 0;
-      node.querySelectorAll('.ticks span').forEach((tick, i) => { tick.textContent = short(low + ((range - low) * i) / 4); });
-      return node;
-    });
-    this.legendsBy = kept;
-    return nodes;
-  }
-
-  legend(field) {
-    const stops = (field.diverging ? this.header.diverging : this.header.sequential).map((c) => `rgb(${c})`);
-    const bar = element('div', { class: 'bar', style: `background:linear-gradient(90deg, ${stops.join(',')})` });
-    const ticks = element('div', { class: 'ticks' }, ...[0, 1, 2, 3, 4].map(() => element('span')));
-    const input = element('input', {
-      type: 'number', step: 'any', min: '0', value: String(Number(this.ranges.get(field).toPrecision(3))), 'aria-label': `Colours of ${field.name} end at, ${field.unit}`,
-      onchange: (e) => {
-        const value = Number(e.target.value);
-        if (value > 0) this.ranges.set(field, value);
-        this.request();
-      },
-    });
-    const most = Math.max(field.high, -field.low);
-    const head = element('div', { class: 'head' }, element('strong', {}, `${field.name}, ${field.unit}`));
-    const foot = element('label', { class: 'foot' }, 'colours end at ', input, ` of ${figure(most)}`);
-    return element('div', { class: 'legend' }, head, bar, ticks, foot);
-  }
-
-  scaleBar(at) {
-    const perPixel = (2 * this.camera.halfHeight) / this.stage.clientHeight;
-    const rough = 110 * perPixel;
-    const power = 10 ** Math.floor(Math.log10(rough));
-    const length = [5, 2, 1].map((m) => m * power).find((l) => l <= rough) ?? power;
-    const bar = element('div', { class: 'scale' }, element('span', {}, `${figure(length)} mm`));
-    bar.style.width = `${length / perPixel}px`;
-    at(bar, 14, this.stage.clientHeight - 26);
-  }
-
-  triad(at) {
-    const svg = (tag, attributes, ...children) => {
-      const node = document.createElementNS('http://www.w3.org/2000/svg', tag);
-      for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-      node.append(...children);
-      return node;
-    };
-    const [right, up, back] = this.camera.axes();
-    const arms = ['x', 'y', 'z'].map((name, k) => ({ name, x: 24 * right[k], y: -24 * up[k], z: back[k], color: ['#b3332e', '#2c7a3f', '#2456a6'][k] }));
-    arms.sort((a, b) => a.z - b.z);
-    const picture = svg('svg', { class: 'triad', width: 76, height: 76, viewBox: '-38 -38 76 76', 'aria-hidden': 'true' });
-    for (const { name, x, y, color } of arms) {
-      picture.append(svg('line', { x1: 0, y1: 0, x2: x, y2: y, stroke: color, 'stroke-width': 2.2, 'stroke-linecap': 'round' }),
-        svg('text', { x: x * 1.36, y: y * 1.36 + 4, 'text-anchor': 'middle', 'font-size': 12, fill: color }, name));
-    }
-    at(picture, 8, this.stage.clientHeight - 112);
   }
 }
 
@@ -445,7 +406,10 @@ async function start() {
     const bytes = await unpack(document.getElementById('geometry').textContent, header.bytes);
     window.topipe = new Viewer(host, header, bytes);
   } catch (error) {
-    host.replaceChildren(element('p', { class: 'note' }, `The model cannot be shown: ${error.message}. The figures below are complete.`));
+    const pictures = document.querySelector('.pictures') ? 'the pictures and ' : '';
+    host.className = 'empty';
+    host.replaceChildren(element('p', { class: 'note', role: 'status' }, `The model cannot be turned here: ${error.message}. `
+      + `Another browser, or graphics acceleration switched on in the settings of this one, will show it; ${pictures}all figures below do not need it.`));
     document.documentElement.dataset.viewer = 'failed';
   }
 }

@@ -28,11 +28,9 @@ mod encode;
 pub mod figures;
 mod histogram;
 mod page;
-mod quantities;
 mod scene;
 
 pub use document::{Document, Export, Figures, Outcome, Parameter, Picture, Stage};
 pub use histogram::Histogram;
 pub use page::html;
-pub use quantities::{duration, size};
 pub use scene::{Categories, ColorMaps, Field, Label, Lines, Points, Scene, Surface};

@@ -16,6 +16,8 @@ pub(crate) fn join(
     interface_points: &[u32],
 ) {
     let holes = handles(part, connectivity, sets);
+    skeleton.non_design_holes =
+        sets.with_label(Design::NonDesign).map(|set| holes[set as usize] as usize).sum();
     for set in sets.with_label(Design::NonDesign) {
         let own: Vec<_> =
             (0..sets.interfaces.len()).filter(|&i| sets.interfaces[i].non_design == set).collect();
@@ -34,8 +36,14 @@ pub(crate) fn join(
         }
         if holes[set as usize] > 0 {
             skeleton.remarks.push(format!(
-                "the non-design part at ({:.3}, {:.3}, {:.3}) has {} holes of its own: the genus exceeds the cycles by as many",
-                point.x, point.y, point.z, holes[set as usize]
+                "the non-design part at ({:.3}, {:.3}, {:.3}) has {}: the genus exceeds the cycles by as many",
+                point.x,
+                point.y,
+                point.z,
+                match holes[set as usize] {
+                    1 => "a hole of its own".to_owned(),
+                    holes => format!("{holes} holes of its own"),
+                }
             ));
         }
     }

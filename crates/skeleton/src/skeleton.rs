@@ -72,6 +72,8 @@ pub struct Skeleton {
     pub sections: Vec<Section>,
     /// Pairs of points, the smaller first, sorted, each once.
     pub edges: Vec<[u32; 2]>,
+    /// Holes that non-design parts have of their own: the genus of the part exceeds the cycles by as many.
+    pub non_design_holes: usize,
     /// What a user should know: unfinished branches, loops inside non-design parts, parts left out.
     pub remarks: Vec<String>,
 }
@@ -99,6 +101,7 @@ impl Skeleton {
             kinds: Vec::new(),
             sections: Vec::new(),
             edges: Vec::new(),
+            non_design_holes: 0,
             remarks: Vec::new(),
         }
     }
@@ -207,6 +210,7 @@ impl Skeleton {
             "sections": sections,
             "components": measures.components,
             "cycles": measures.cycles,
+            "non_design_holes": self.non_design_holes,
             "remarks": self.remarks,
         })
     }

@@ -27,7 +27,7 @@ kinds! {
     /// A closed surface of B-spline patches.
     SplineSurface = "spline surface" v 2: topipe_spline_fit::SplineSurface;
     /// A curve skeleton.
-    Skeleton = "skeleton" v 2: topipe_skeleton::Skeleton;
+    Skeleton = "skeleton" v 3: topipe_skeleton::Skeleton;
     /// Beams between shared nodes.
     Beams = "beam structure" v 2: topipe_beams::Structure;
     /// A comparison of smoothing methods.
@@ -35,5 +35,5 @@ kinds! {
     /// Compliances under the same loads.
     Stiffness = "stiffness" v 2: topipe_stiffness::Stiffness;
     /// The figures of a validation.
-    Report = "report" v 5: topipe_validation::Report;
+    Report = "report" v 6: topipe_validation::Report;
 }

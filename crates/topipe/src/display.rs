@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use topipe_engine::{Event, EventSink, ExitCode, ExportOutcome, Outcome, RunRecord};
-pub(crate) use topipe_report::{duration, size};
+pub(crate) use topipe_progress::{duration, size};
 
 /// Whether stderr is a terminal on which colors are welcome (<https://no-color.org>).
 pub(crate) fn colors_on_stderr() -> bool {

@@ -333,6 +333,8 @@ pub struct SkeletonFigures {
     pub cycles: i64,
     /// Of the mesh; `null` where it is open.
     pub genus: Option<i64>,
+    /// Holes of non-design parts, which have no centre line: as many cycles less than the genus are to be expected.
+    pub non_design_holes: usize,
     /// Connected components.
     pub components: usize,
     /// Points with one edge.

@@ -2,34 +2,22 @@
 
 use crate::{DeviationFigures, Report};
 use std::fmt::Write;
+use topipe_progress::number;
 use topipe_stiffness::Stiffness;
 
 fn genus(genus: Option<i64>) -> String {
     genus.map_or_else(|| "unknown (open)".to_owned(), |g| g.to_string())
 }
 
-/// A figure with four digits, without exponents where none are needed.
-fn figure(x: f64) -> String {
-    match x.abs() {
-        0.0 => "0".to_owned(),
-        a if (1e-3..1e4).contains(&a) => {
-            let digits = (3 - a.log10().floor() as i32).clamp(0, 6) as usize;
-            format!("{x:.digits$}")
-        }
-        a if (1e4..1e15).contains(&a) => format!("{x:.0}"),
-        _ => format!("{x:.2e}"),
-    }
-}
-
 fn deviation(deviation: &DeviationFigures) -> String {
-    let [x, y, z] = deviation.max_at.map(figure);
+    let [x, y, z] = deviation.max_at.map(number);
     format!(
         "mean {} mm ({} of the diagonal), rms {} mm, max {} mm ({}) at ({x}, {y}, {z})",
-        figure(deviation.mean_mm),
-        figure(deviation.mean_rel),
-        figure(deviation.rms_mm),
-        figure(deviation.max_mm),
-        figure(deviation.max_rel),
+        number(deviation.mean_mm),
+        number(deviation.mean_rel),
+        number(deviation.rms_mm),
+        number(deviation.max_mm),
+        number(deviation.max_rel),
     )
 }
 
@@ -39,7 +27,7 @@ pub fn stiffness_summary(stiffness: &Stiffness) -> String {
         "stiffness  {} load case{} on cells of {} mm\n",
         stiffness.load_cases,
         if stiffness.load_cases == 1 { "" } else { "s" },
-        figure(stiffness.cell)
+        number(stiffness.cell)
     );
     for (name, f) in stiffness.models() {
         let equal = f
@@ -50,11 +38,11 @@ pub fn stiffness_summary(stiffness: &Stiffness) -> String {
         });
         text += &format!(
             "           {name}: compliance {} N mm ({:+.2} %{equal}{smoothed}), volume {} mm3, von Mises up to {} MPa, moves by {} mm\n",
-            figure(f.compliance),
+            number(f.compliance),
             100.0 * f.compliance_change,
-            figure(f.volume),
-            figure(f.max_von_mises),
-            figure(f.max_displacement)
+            number(f.volume),
+            number(f.max_von_mises),
+            number(f.max_displacement)
         );
     }
     text
@@ -78,8 +66,8 @@ impl Report {
             genus(o.genus),
             o.components,
             if o.components == 1 { "" } else { "s" },
-            figure(o.volume_mm3),
-            figure(o.area_mm2)
+            number(o.volume_mm3),
+            number(o.area_mm2)
         )?;
         for repair in &o.repairs {
             writeln!(text, "           repaired: {} ({})", repair.what, repair.count)?;
@@ -91,12 +79,12 @@ impl Report {
                 "smoothing  {}, {} iterations ({converged}), volume error {}, {} frozen vertices ({} moved)",
                 s.method,
                 s.iterations,
-                figure(s.volume_error),
+                number(s.volume_error),
                 s.frozen_vertices,
                 s.frozen_moved
             )?;
             for hole in &s.holes {
-                let [x, y, z] = hole.point.map(figure);
+                let [x, y, z] = hole.point.map(number);
                 let before = hole.diameter_before_mm.map_or_else(|| "?".to_owned(), |d| format!("{d:.6}"));
                 writeln!(
                     text,
@@ -110,12 +98,12 @@ impl Report {
                     text,
                     "           {} bosses and arcs, round to {} mm",
                     s.cylinders.len(),
-                    figure(worst)
+                    number(worst)
                 )?;
             }
             if !s.flat_faces.is_empty() {
                 let worst = s.flat_faces.iter().map(|f| f.flatness_after_mm).fold(0.0, f64::max);
-                writeln!(text, "           {} flat faces, flat to {} mm", s.flat_faces.len(), figure(worst))?;
+                writeln!(text, "           {} flat faces, flat to {} mm", s.flat_faces.len(), number(worst))?;
             }
             if let Some(shape) = &s.shape {
                 let before =
@@ -150,8 +138,8 @@ impl Report {
             writeln!(
                 text,
                 "           largest corner {} degrees, smallest scaled Jacobian {}, valences: {}",
-                figure(l.max_corner_angle_deg),
-                figure(l.min_scaled_jacobian),
+                number(l.max_corner_angle_deg),
+                number(l.min_scaled_jacobian),
                 valences.join(", ")
             )?;
         }
@@ -163,24 +151,24 @@ impl Report {
                 s.control_points,
                 if s.closed { "closed" } else { "NOT CLOSED" },
                 genus(s.genus),
-                figure(s.volume_mm3),
-                figure(s.volume_error),
-                figure(s.gap_mm)
+                number(s.volume_mm3),
+                number(s.volume_error),
+                number(s.gap_mm)
             )?;
             if s.planes + s.cylinders > 0 {
                 let flatness =
-                    s.flatness_mm.map_or_else(String::new, |f| format!(" flat to {} mm", figure(f)));
+                    s.flatness_mm.map_or_else(String::new, |f| format!(" flat to {} mm", number(f)));
                 writeln!(
                     text,
                     "           {} planes{flatness}, {} cylinders; volume error {} without the {} mm3 between facets and cylinders",
                     s.planes,
                     s.cylinders,
-                    figure(s.volume_error_without_rounding),
-                    figure(s.rounding_mm3)
+                    number(s.volume_error_without_rounding),
+                    number(s.rounding_mm3)
                 )?;
             }
             for hole in s.round_faces.iter().filter(|face| face.hole) {
-                let [x, y, z] = hole.point.map(figure);
+                let [x, y, z] = hole.point.map(number);
                 let mesh = hole.diameter_mesh_mm.map_or_else(|| "?".to_owned(), |d| format!("{d:.6}"));
                 writeln!(
                     text,
@@ -195,46 +183,50 @@ impl Report {
                 writeln!(text, "           from the original: {}", deviation(d))?;
             }
             if let Some(j) = &s.normal_jump_deg {
-                let [x, y, z] = j.max_at.map(figure);
+                let [x, y, z] = j.max_at.map(number);
                 writeln!(
                     text,
                     "           normal jump over {} edges: mean {}, p99 {}, max {} degrees at ({x}, {y}, {z})",
                     j.edges,
-                    figure(j.mean),
-                    figure(j.p99),
-                    figure(j.max)
+                    number(j.mean),
+                    number(j.p99),
+                    number(j.max)
                 )?;
             }
             for f in &s.features {
-                let dihedral = f.min_dihedral_deg.map_or_else(|| "?".to_owned(), figure);
+                let dihedral = f.min_dihedral_deg.map_or_else(|| "?".to_owned(), number);
                 writeln!(
                     text,
                     "           {} features ({}): {} mm, at least {dihedral} degrees",
                     f.edges,
                     f.kind,
-                    figure(f.length_mm)
+                    number(f.length_mm)
                 )?;
             }
         }
         if let Some(s) = &self.skeleton {
-            let e = |e: Option<f64>| e.map_or_else(|| "?".to_owned(), figure);
+            let e = |e: Option<f64>| e.map_or_else(|| "?".to_owned(), number);
             writeln!(
                 text,
                 "skeleton   {} branch points, {} branches, {} junctions, {} mm, {} of it with sections; E_center {} ({} by length)",
                 s.compactness,
                 s.branches,
                 s.junctions,
-                figure(s.length_mm),
+                number(s.length_mm),
                 e(s.beam_share),
                 e(s.e_center),
                 e(s.e_center_by_length)
             )?;
             writeln!(
                 text,
-                "           {} points outside, {} cycles for genus {}",
+                "           {} points outside, {} cycles for genus {}{}",
                 s.out_of_object,
                 s.cycles,
-                genus(s.genus)
+                genus(s.genus),
+                match s.non_design_holes {
+                    0 => String::new(),
+                    holes => format!(" less {holes} within non-design parts"),
+                }
             )?;
         }
         if let Some(stiffness) = &self.stiffness {
@@ -245,20 +237,5 @@ impl Report {
             writeln!(text, "limits     {mark}: {}", limit.describe())?;
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::figure;
-
-    #[test]
-    fn figures_have_four_digits() {
-        for (x, text) in
-            [(0.0, "0"), (1.0, "1.000"), (-12.3456, "-12.35"), (123456.7, "123457"), (2.5e-9, "2.50e-9")]
-        {
-            assert_eq!(figure(x), text);
-        }
-        assert_eq!(figure(f64::NAN), "NaN");
     }
 }

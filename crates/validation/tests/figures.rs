@@ -438,6 +438,7 @@ fn ring_skeleton(radius: f64, count: u32) -> Skeleton {
         kinds: vec![PointKind::Branch; count as usize],
         sections: vec![Section::None; count as usize],
         edges: (0..count).map(|k| [k, (k + 1) % count]).collect(),
+        non_design_holes: 0,
         remarks: Vec::new(),
     }
 }

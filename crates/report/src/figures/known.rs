@@ -1,6 +1,8 @@
 //! What is known about the figures of a report: words, limits, order.
 
-use super::limit::Limit::{self, Above, AtMost, Known, MagnitudeAtMost, None as No, Same, Share, True, Zero};
+use super::limit::Limit::{
+    self, Above, AtMost, ChangeAtMost, Known, Loops, None as No, Same, Share, True, Zero,
+};
 
 pub(super) struct Figure {
     pub(super) path: &'static str,
@@ -31,8 +33,8 @@ pub(super) const KNOWN: &[Figure] = &[
     figure(
         "smoothing.volume_error",
         "Change of volume by smoothing",
-        "Volume kept by smoothing",
-        MagnitudeAtMost(1e-9),
+        "Volume changed by smoothing",
+        ChangeAtMost(1e-9),
     ),
     figure("smoothing.total_change_mm", "Distance of all vertices from their first places, summed", "", No),
     figure("smoothing.cumulative_change_mm", "Way all vertices have travelled, summed", "", No),
@@ -90,7 +92,7 @@ pub(super) const KNOWN: &[Figure] = &[
         "surface.volume_error",
         "Volume against the smoothed mesh",
         "Volume of the solid",
-        MagnitudeAtMost(1e-3),
+        ChangeAtMost(1e-3),
     ),
     figure("surface.rounding_mm3", "Volume between true cylinders and the facets of the mesh", "", No),
     figure("surface.volume_error_without_rounding", "The same without what true cylinders add", "", No),
@@ -187,13 +189,9 @@ pub(super) const KNOWN: &[Figure] = &[
     figure("skeleton.out_of_object", "Points of the centre line outside the part", "", Zero),
     figure("skeleton.junctions", "Junctions", "", No),
     figure("skeleton.branches", "Branches", "", No),
-    figure(
-        "skeleton.cycles",
-        "Loops of the centre line",
-        "",
-        Same("skeleton.genus", "as the handles of the part"),
-    ),
+    figure("skeleton.cycles", "Loops of the centre line", "", Loops),
     figure("skeleton.genus", "Handles of the part", "", No),
+    figure("skeleton.non_design_holes", "Handles within non-design parts, which have no centre line", "", No),
     figure("skeleton.components", "Separate pieces", "", No),
     figure("skeleton.free_ends", "Free ends", "", No),
     figure("skeleton.length_mm", "Length of the centre line", "", No),

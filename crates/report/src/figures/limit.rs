@@ -1,14 +1,16 @@
 //! Limits of figures, and whether they are kept.
 
 use super::State;
-use super::words::{number, text, with_unit};
+use super::words::{text, with_unit};
 use serde_json::Value;
+use topipe_progress::number;
 
 /// What a figure may be.
 pub(super) enum Limit {
     None,
     AtMost(f64),
-    MagnitudeAtMost(f64),
+    /// A relative change.
+    ChangeAtMost(f64),
     /// A length that must not exceed a share of the diagonal; the figure that says what share it is.
     Share(f64, &'static str),
     Above(f64),
@@ -16,6 +18,8 @@ pub(super) enum Limit {
     True,
     /// Equal to another figure, which is named.
     Same(&'static str, &'static str),
+    /// As many loops as handles, but for those within non-design parts, which have no centre line.
+    Loops,
     /// Must be known.
     Known(&'static str),
 }
@@ -44,8 +48,11 @@ pub(super) fn judge(report: &Value, value: &Value, limit: &Limit, unit: &str) ->
     match limit {
         Limit::None => (None, State::Free),
         Limit::AtMost(most) => (Some(format!("at most {}", at(*most))), state(x.map(|x| x <= *most))),
-        Limit::MagnitudeAtMost(most) => {
-            (Some(format!("at most \u{b1}{}", at(*most))), state(x.map(|x| x.abs() <= *most)))
+        Limit::ChangeAtMost(most) => {
+            // Shown in percent, as the figures are.
+            let percent = 100.0 * most;
+            let percent = if percent < 1e-3 { format!("{percent:.0e}") } else { percent.to_string() };
+            (Some(format!("at most \u{b1}{percent} %")), state(x.map(|x| x.abs() <= *most)))
         }
         Limit::Share(most, path) => match (x, lookup(report, path).and_then(Value::as_f64)) {
             (Some(x), Some(share)) if share > 0.0 => {
@@ -60,6 +67,22 @@ pub(super) fn judge(report: &Value, value: &Value, limit: &Limit, unit: &str) ->
             true => (Some(format!("known; {why_not}")), State::Broken),
             false => (None, State::Free),
         },
+        Limit::Loops => {
+            let count = |path| lookup(report, path).and_then(Value::as_i64);
+            let (Some(handles), Some(loops)) = (count("skeleton.genus"), value.as_i64()) else {
+                return (None, State::Free);
+            };
+            match count("skeleton.non_design_holes").unwrap_or(0) {
+                0 => (Some(format!("{handles} as the handles of the part")), state(Some(loops == handles))),
+                within => (
+                    Some(format!(
+                        "{}: {handles} handles less {within} within non-design parts",
+                        handles - within
+                    )),
+                    state(Some(loops == handles - within)),
+                ),
+            }
+        }
         Limit::Same(path, words) => match lookup(report, path).filter(|other| !other.is_null()) {
             Some(other) => (Some(format!("{} {words}", text(other))), state(Some(other == value))),
             None => (None, State::Free),

@@ -8,8 +8,6 @@ mod limit;
 mod walk;
 mod words;
 
-pub use words::number;
-
 use known::SECTIONS;
 use serde_json::Value;
 use walk::Walk;
@@ -151,7 +149,11 @@ mod tests {
             assert_eq!(find(&sections, path).state, state, "{path}");
         }
         assert_eq!(find(&sections, "surface.deviation.max_mm").at, Some([1.0, 2.0, 3.0]));
-        assert_eq!(find(&sections, "surface.volume_error").value, "-0.0800 %");
+        let volume = find(&sections, "surface.volume_error");
+        assert_eq!(
+            (volume.value.as_str(), volume.limit.as_deref()),
+            ("-0.0800 %", Some("at most \u{b1}0.1 %"))
+        );
         assert_eq!(find(&sections, "surface.normal_jump_deg.max").value, "180.0\u{b0}");
         assert_eq!(find(&sections, "surface.normal_jump_deg.points").value, "12");
         assert_eq!(broken(&report).len(), 4);
@@ -185,6 +187,23 @@ mod tests {
         assert_eq!((findings[0].state, findings[1].state), (State::Kept, State::Broken));
         assert_eq!((findings[1].value.as_str(), findings[1].at), ("0.7500 mm", Some([1.0, 2.0, 3.0])));
         assert_eq!(findings[1].limit.as_deref(), Some("at most 0.5000 mm"));
+    }
+
+    #[test]
+    fn loops_are_missing_only_outside_of_non_design_parts() {
+        for (cycles, within, state) in [
+            (5, json!(0), State::Kept),
+            (1, json!(4), State::Kept),
+            (1, json!(null), State::Broken),
+            (2, json!(4), State::Broken),
+        ] {
+            let report = json!({"skeleton": {"cycles": cycles, "genus": 5, "non_design_holes": within}});
+            assert_eq!(
+                find(&sections(&report), "skeleton.cycles").state,
+                state,
+                "{cycles} and {within} within"
+            );
+        }
     }
 
     #[test]

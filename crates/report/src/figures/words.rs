@@ -1,20 +1,7 @@
 //! Numbers, names and values as people read them.
 
 use serde_json::Value;
-
-/// Four digits, without an exponent where none is needed.
-pub fn number(x: f64) -> String {
-    match x.abs() {
-        0.0 => "0".to_owned(),
-        a if (1e-3..1e4).contains(&a) => {
-            let digits = (3 - a.log10().floor() as i32).clamp(0, 6) as usize;
-            format!("{x:.digits$}")
-        }
-        a if (1e4..1e15).contains(&a) => format!("{x:.0}"),
-        _ if x.is_finite() => format!("{x:.2e}"),
-        _ => "unknown".to_owned(),
-    }
-}
+use topipe_progress::number;
 
 /// The unit that the end of a name tells, and the name without it.
 pub(super) fn unit(key: &str) -> (&str, &str) {
@@ -79,9 +66,11 @@ pub(super) fn with_unit(value: &Value, unit: &str) -> String {
 pub(super) fn shown(key: &str, value: &Value) -> String {
     let (_, unit) = unit(key);
     match value.as_f64() {
-        Some(x) if (key.contains("_error") || key.ends_with("_change")) && x.abs() >= 1e-6 => {
-            format!("{:+.4} %", 100.0 * x)
-        }
+        Some(x) if x != 0.0 && (key.contains("_error") || key.ends_with("_change")) => match x.abs() {
+            // Rounding, not change.
+            ..1e-6 => format!("{:+.0e} %", 100.0 * x),
+            _ => format!("{:+.4} %", 100.0 * x),
+        },
         _ => with_unit(value, unit),
     }
 }

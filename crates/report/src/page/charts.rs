@@ -1,8 +1,8 @@
 //! Histograms as bars.
 
-use crate::figures;
 use crate::histogram::Histogram;
 use maud::{Markup, html};
+use topipe_progress::number;
 
 pub(super) fn distributions(histograms: &[Histogram]) -> Markup {
     html! {
@@ -38,12 +38,12 @@ fn chart(histogram: &Histogram) -> Markup {
             format!("{:.2} %", 100.0 * share)
         }
     };
-    let largest = format!("{} {}", figures::number(histogram.largest), histogram.unit);
+    let largest = format!("{} {}", number(histogram.largest), histogram.unit);
     let spoken = format!(
         "{}: bars from {} to {} {}, largest value {largest}",
         histogram.title,
-        figures::number(low),
-        figures::number(high),
+        number(low),
+        number(high),
         histogram.unit
     );
     html! {
@@ -62,7 +62,7 @@ fn chart(histogram: &Histogram) -> Markup {
                         rect.bar.beyond[histogram.limit.is_some_and(|limit| bar[0] >= limit)]
                             x=(fixed(x(bar[0]) + 0.5)) width=(fixed((x(bar[1]) - x(bar[0]) - 1.0).max(0.5)))
                             y=(fixed(y(*share))) height=(fixed((height - bottom - y(*share)).max(0.75))) {
-                            title { (figures::number(bar[0])) " to " (figures::number(bar[1])) " " (histogram.unit) ": " (percent(*share)) }
+                            title { (number(bar[0])) " to " (number(bar[1])) " " (histogram.unit) ": " (percent(*share)) }
                         }
                     }
                 }

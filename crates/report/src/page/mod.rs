@@ -7,23 +7,25 @@ mod run;
 use crate::document::{Document, Picture};
 use crate::encode::encode;
 use crate::figures::{Section, State};
-use crate::quantities::duration;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use charts::distributions;
 use figures::{figures_section, headlines};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use run::{files, parameters, pipeline, stages};
+use topipe_progress::duration;
 
 const STYLE: &str = include_str!("../../assets/report.css");
 /// In the order of their dependence.
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 9] = [
     include_str!("../../assets/decode.js"),
     include_str!("../../assets/vectors.js"),
     include_str!("../../assets/geometry.js"),
+    include_str!("../../assets/coarsen.js"),
     include_str!("../../assets/shaders.js"),
     include_str!("../../assets/pane.js"),
     include_str!("../../assets/controls.js"),
+    include_str!("../../assets/annotations.js"),
     include_str!("../../assets/main.js"),
 ];
 

@@ -1,9 +1,9 @@
 //! What ran: stages, pipeline, parameters, files.
 
 use crate::document::{Document, Outcome, Stage};
-use crate::quantities::{duration, size};
 use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
+use topipe_progress::{duration, size};
 
 fn outcome(stage: &Stage) -> Markup {
     html! {

@@ -66,6 +66,7 @@ pub(crate) fn figures(
         branches: branches(&neighbors),
         cycles: edges.len() as i64 - count as i64 + components as i64,
         genus: topology::count(&part.mesh).genus,
+        non_design_holes: skeleton.non_design_holes,
         components,
         free_ends: degree(|d| d == 1),
         length_mm: edges

@@ -1,4 +1,18 @@
-//! Times and sizes in few digits, for the page and for whoever tells of a run elsewhere.
+//! Numbers, times and sizes in few digits, as people read them.
+
+/// Four digits, without an exponent where none is needed; "unknown" for what is no number.
+pub fn number(x: f64) -> String {
+    match x.abs() {
+        0.0 => "0".to_owned(),
+        a if (1e-3..1e4).contains(&a) => {
+            let digits = (3 - a.log10().floor() as i32).clamp(0, 6) as usize;
+            format!("{x:.digits$}")
+        }
+        a if (1e4..1e15).contains(&a) => format!("{x:.0}"),
+        _ if x.is_finite() => format!("{x:.2e}"),
+        _ => "unknown".to_owned(),
+    }
+}
 
 /// "1.2 s", "340 ms", "2 min 5 s".
 pub fn duration(seconds: f64) -> String {
@@ -28,6 +42,11 @@ mod tests {
 
     #[test]
     fn few_digits_and_a_unit() {
+        assert_eq!(
+            [0.0, 0.012_345, 6.0, 1234.56, 123_456.7].map(number),
+            ["0", "0.01235", "6.000", "1235", "123457"]
+        );
+        assert_eq!([-2.5e-7, f64::NAN, f64::INFINITY].map(number), ["-2.50e-7", "unknown", "unknown"]);
         assert_eq!(duration(0.0), "0 ms");
         assert_eq!(duration(0.34), "340 ms");
         assert_eq!(duration(1.25), "1.2 s");
