@@ -10,7 +10,7 @@ fn a_new_pipeline_is_a_good_one() {
     let ended = shop.topipe(&["new", "box.off", "-o", "fresh.toml"]);
     assert_eq!(ended.code, 0, "{}", ended.stderr);
     for seen in [
-        "432 triangles, 3.0000 x 2.0000 x 1.0000",
+        "432 triangles, 3.000 x 2.000 x 1.000 mm, volume 6.000 mm3",
         "closed, 1 component, genus 0",
         "unit mm",
         "not smoothed: all 218 vertices are frozen",
@@ -50,6 +50,9 @@ fn a_new_pipeline_takes_labels_and_a_unit_that_fits() {
     shop.write("small part.labels.csv", &"0\n".repeat(432));
     let ended = shop.topipe(&["new", "small part.off"]);
     assert_eq!(ended.code, 0, "{}", ended.stderr);
+    // A name with a space is quoted where a command is suggested.
+    let asked = shop.topipe(&["run", "small part.toml"]);
+    assert!(asked.stderr.contains("`topipe new 'small part.off' -o 'small part.toml'`"), "{}", asked.stderr);
     let text = shop.read("small-part.toml");
     assert!(text.contains("units = \"m\"") && text.contains("labels = \"small part.labels.csv\""), "{text}");
     assert_eq!(shop.topipe(&["plan", "small-part.toml"]).code, 0);

@@ -111,6 +111,44 @@ mod tests {
         assert_eq!(sequential(2.0), sequential(1.0));
     }
 
+    /// Lightness and two opponent colours (CIELAB, D65) of a colour as people without one kind of cone see it.
+    fn seen(color: Color, eye: [[f64; 3]; 3]) -> [f64; 3] {
+        let apply =
+            |m: [[f64; 3]; 3], v: [f64; 3]| m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2]);
+        let linear = apply(eye, color.to_linear().map(f64::from)).map(|c| c.clamp(0.0, 1.0));
+        let to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]];
+        let xyz = apply(to_xyz, linear);
+        let f = |t: f64| if t > 0.008_856 { t.cbrt() } else { 7.787 * t + 16.0 / 116.0 };
+        let [x, y, z] = [f(xyz[0] / 0.9505), f(xyz[1]), f(xyz[2] / 1.089)];
+        [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+    }
+
+    /// Machado, Oliveira, Fernandes 2009, full severity, in linear light.
+    const EYES: [(&str, [[f64; 3]; 3]); 4] = [
+        ("normal", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+        ("protanopia", [[0.1523, 1.0526, -0.2049], [0.1145, 0.7863, 0.0992], [-0.0039, -0.0481, 1.0520]]),
+        ("deuteranopia", [[0.3673, 0.8606, -0.2280], [0.2801, 0.6725, 0.0474], [-0.0118, 0.0429, 0.9689]]),
+        ("tritanopia", [[1.2555, -0.0767, -0.1788], [-0.0784, 0.9308, 0.1476], [0.0047, 0.6914, 0.3039]]),
+    ];
+
+    #[test]
+    fn numbers_are_read_without_one_kind_of_cone() {
+        let distance =
+            |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        for (eye, matrix) in EYES {
+            let lightness: Vec<f64> =
+                (0..=20).map(|k| seen(sequential(f64::from(k) / 20.0), matrix)[0]).collect();
+            assert!(lightness.windows(2).all(|w| w[1] > w[0] + 0.5), "{eye}: {lightness:?}");
+            assert!(lightness[20] - lightness[0] > 45.0, "{eye}: {lightness:?}");
+            for k in 4..=20 {
+                let t = f64::from(k) / 20.0;
+                let apart = distance(seen(diverging(t), matrix), seen(diverging(-t), matrix));
+                // Some 2.3 are just noticed.
+                assert!(apart > 12.0, "{eye}: signs of {t} are {apart} apart");
+            }
+        }
+    }
+
     #[test]
     fn diverging_is_lightest_at_zero_and_even_to_both_sides() {
         let luminance = |t: f64| {

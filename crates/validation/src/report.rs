@@ -132,6 +132,8 @@ pub struct DihedralFigures {
     pub histogram: [usize; 18],
     /// Faces whose normal is more than 120 degrees from the mean of their neighbours'.
     pub folded_faces: usize,
+    /// Those of them of which, and of whose neighbours, no vertex may move: no smoothing can unfold them.
+    pub folded_held: usize,
 }
 
 /// Angle between the normals across edges where moved faces meet faces that did not move.

@@ -110,8 +110,14 @@ impl Report {
                     shape.before.as_ref().map_or_else(|| "?".to_owned(), |b| format!("{:.1}", b.max_deg));
                 writeln!(
                     text,
-                    "           largest dihedral angle {before} -> {:.1} degrees, {} folded faces, {} self-intersections",
-                    shape.after.max_deg, shape.after.folded_faces, shape.self_intersections
+                    "           largest dihedral angle {before} -> {:.1} degrees, {} folded faces{}, {} self-intersections",
+                    shape.after.max_deg,
+                    shape.after.folded_faces,
+                    match shape.after.folded_held {
+                        0 => String::new(),
+                        held => format!(" ({held} among held vertices alone)"),
+                    },
+                    shape.self_intersections
                 )?;
                 if let Some(kink) = &shape.kink_after {
                     writeln!(

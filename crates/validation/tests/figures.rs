@@ -596,3 +596,25 @@ fn an_interrupted_run_says_so() {
     let result = validate(&Inputs::of(&original), &Parameters::default(), &progress);
     assert!(matches!(result, Err(ValidationError::Interrupted(_))));
 }
+
+#[test]
+fn folds_among_held_vertices_are_told_apart() {
+    let original = Part::new(torus(10.0, 3.0, 24, 12));
+    let mut part = original.clone();
+    // One vertex is pushed through the tube: the faces around it turn over.
+    let at = part.mesh.positions[0];
+    let center = DVec3::new(at.x, at.y, 0.0).normalize() * 10.0;
+    part.mesh.positions[0] = at + 0.7 * (center - at) + DVec3::new(0.0, 4.0, 0.0);
+    let folds = |part: &Part| {
+        let inputs = Inputs { mesh: Some(part), ..Inputs::of(&original) };
+        let after = report(&inputs).smoothing.unwrap().shape.unwrap().after;
+        (after.folded_faces, after.folded_held)
+    };
+    let (all, held) = folds(&part);
+    assert!(all > 0 && held == 0, "{all} folds, {held} held");
+    part.frozen.fill(true);
+    assert_eq!(folds(&part), (all, all));
+    part.frozen[0] = false;
+    let (again, held) = folds(&part);
+    assert!(again == all && held < all, "{held} of {again}");
+}

@@ -1,7 +1,7 @@
 //! What is known about the figures of a report: words, limits, order.
 
 use super::limit::Limit::{
-    self, Above, AtMost, ChangeAtMost, Known, Loops, None as No, Same, Share, True, Zero,
+    self, Above, AtMost, ChangeAtMost, Folds, Known, Loops, None as No, Same, Share, True, Zero,
 };
 
 pub(super) struct Figure {
@@ -43,7 +43,19 @@ pub(super) const KNOWN: &[Figure] = &[
     figure("smoothing.shape.before.max_deg", "Sharpest edge before smoothing", "", No),
     figure("smoothing.shape.before.folded_faces", "Folded-over triangles before smoothing", "", No),
     figure("smoothing.shape.after.max_deg", "Sharpest edge after smoothing", "", No),
-    figure("smoothing.shape.after.folded_faces", "Folded-over triangles after smoothing", "", Zero),
+    figure("smoothing.shape.after.folded_faces", "Folded-over triangles after smoothing", "", Folds),
+    figure(
+        "smoothing.shape.before.folded_held",
+        "Those of them with held vertices alone, also in their neighbours",
+        "",
+        No,
+    ),
+    figure(
+        "smoothing.shape.after.folded_held",
+        "Those of them with held vertices alone: no smoothing can unfold them",
+        "",
+        No,
+    ),
     figure("smoothing.shape.kink_before.edges", "Edges between held and moved triangles", "", No),
     figure("smoothing.shape.kink_before.median_deg", "Half of them were less sharp before than", "", No),
     figure("smoothing.shape.kink_before.p90_deg", "Nine in ten were less sharp before than", "", No),

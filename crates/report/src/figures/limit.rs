@@ -20,6 +20,8 @@ pub(super) enum Limit {
     Same(&'static str, &'static str),
     /// As many loops as handles, but for those within non-design parts, which have no centre line.
     Loops,
+    /// None, but for those that are held in place.
+    Folds,
     /// Must be known.
     Known(&'static str),
 }
@@ -52,7 +54,7 @@ pub(super) fn judge(report: &Value, value: &Value, limit: &Limit, unit: &str) ->
             // Shown in percent, as the figures are.
             let percent = 100.0 * most;
             let percent = if percent < 1e-3 { format!("{percent:.0e}") } else { percent.to_string() };
-            (Some(format!("at most \u{b1}{percent} %")), state(x.map(|x| x.abs() <= *most)))
+            (Some(format!("at most \u{b1}{percent}\u{a0}%")), state(x.map(|x| x.abs() <= *most)))
         }
         Limit::Share(most, path) => match (x, lookup(report, path).and_then(Value::as_f64)) {
             (Some(x), Some(share)) if share > 0.0 => {
@@ -67,6 +69,16 @@ pub(super) fn judge(report: &Value, value: &Value, limit: &Limit, unit: &str) ->
             true => (Some(format!("known; {why_not}")), State::Broken),
             false => (None, State::Free),
         },
+        Limit::Folds => {
+            let held =
+                lookup(report, "smoothing.shape.after.folded_held").and_then(Value::as_u64).unwrap_or(0);
+            let words = if held == 0 {
+                "none".into()
+            } else {
+                format!("none but the {held} with held vertices alone")
+            };
+            (Some(words), state(value.as_u64().map(|folds| folds <= held)))
+        }
         Limit::Loops => {
             let count = |path| lookup(report, path).and_then(Value::as_i64);
             let (Some(handles), Some(loops)) = (count("skeleton.genus"), value.as_i64()) else {

@@ -152,7 +152,7 @@ mod tests {
         let volume = find(&sections, "surface.volume_error");
         assert_eq!(
             (volume.value.as_str(), volume.limit.as_deref()),
-            ("-0.0800 %", Some("at most \u{b1}0.1 %"))
+            ("-0.0800 %", Some("at most \u{b1}0.1\u{a0}%"))
         );
         assert_eq!(find(&sections, "surface.normal_jump_deg.max").value, "180.0\u{b0}");
         assert_eq!(find(&sections, "surface.normal_jump_deg.points").value, "12");

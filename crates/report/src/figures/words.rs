@@ -62,7 +62,7 @@ pub(super) fn with_unit(value: &Value, unit: &str) -> String {
     }
 }
 
-/// Relative errors read better as percent.
+/// Relative errors and shares of the diagonal read better as percent.
 pub(super) fn shown(key: &str, value: &Value) -> String {
     let (_, unit) = unit(key);
     match value.as_f64() {
@@ -71,6 +71,7 @@ pub(super) fn shown(key: &str, value: &Value) -> String {
             ..1e-6 => format!("{:+.0e} %", 100.0 * x),
             _ => format!("{:+.4} %", 100.0 * x),
         },
+        Some(x) if key.ends_with("_rel") => format!("{:.4} %", 100.0 * x),
         _ => with_unit(value, unit),
     }
 }

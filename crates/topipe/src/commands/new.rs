@@ -8,7 +8,7 @@ use topipe_engine::ExitCode;
 use topipe_engine::cache::write_atomically;
 use topipe_mesh::import::ImportOptions;
 use topipe_mesh::{Connectivity, Part, RegionShape};
-use topipe_progress::Progress;
+use topipe_progress::{Progress, number};
 
 /// Meshes up to so many triangles are smoothed once to see what is in them: about a second.
 const LOOKED_AT: usize = 150_000;
@@ -156,7 +156,15 @@ impl Looked {
         let genus = self.genus.map_or("unknown genus".into(), |genus| format!("genus {genus}"));
         let plural = |n: usize, what: &str| if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") };
         let mut text = vec![
-            format!("{} triangles, {x:.4} x {y:.4} x {z:.4}, volume {:.6}", self.triangles, self.volume),
+            format!(
+                "{} triangles, {} x {} x {} {unit}, volume {} {unit}3",
+                self.triangles,
+                number(x),
+                number(y),
+                number(z),
+                number(self.volume),
+                unit = self.units.name
+            ),
             format!(
                 "{}, {}, {genus}",
                 if self.closed { "closed" } else { "open" },
@@ -166,6 +174,12 @@ impl Looked {
         ];
         if !self.repairs.is_empty() {
             text.push(format!("repaired on import: {}", self.repairs.join(", ")));
+        }
+        if self.repairs.iter().any(|repair| repair.contains("smaller components")) {
+            text.push(
+                "only the largest piece is taken; components = \"all\" in [stage.mesh] keeps the others"
+                    .into(),
+            );
         }
         match &self.features {
             Features::Found { holes, bosses, planes } => {

@@ -11,11 +11,11 @@ const FOLDED: f64 = -0.5;
 pub(super) fn figures(original: &Part, part: &Part) -> Option<ShapeFigures> {
     let connectivity = Connectivity::build(&part.mesh).ok()?;
     let same_triangles = original.mesh.triangles == part.mesh.triangles;
-    let before = same_triangles.then(|| dihedral(&original.mesh, &connectivity));
+    let before = same_triangles.then(|| dihedral(&original.mesh, &part.frozen, &connectivity));
     let kink_before = same_triangles.then(|| kink(part, &original.mesh, &connectivity)).flatten();
     Some(ShapeFigures {
         before,
-        after: dihedral(&part.mesh, &connectivity),
+        after: dihedral(&part.mesh, &part.frozen, &connectivity),
         kink_before,
         kink_after: kink(part, &part.mesh, &connectivity),
         self_intersections: crossings(&part.mesh).len(),
@@ -36,20 +36,21 @@ fn angles<'a>(
     })
 }
 
-fn dihedral(mesh: &TriangleMesh, connectivity: &Connectivity) -> DihedralFigures {
+fn dihedral(mesh: &TriangleMesh, frozen: &[bool], connectivity: &Connectivity) -> DihedralFigures {
     let normals: Vec<DVec3> = mesh.faces().map(|f| mesh.normal(f)).collect();
-    let mut figures = DihedralFigures { max_deg: 0.0, histogram: [0; 18], folded_faces: 0 };
+    let mut figures = DihedralFigures { max_deg: 0.0, histogram: [0; 18], folded_faces: 0, folded_held: 0 };
+    let still = |f: FaceId| mesh.triangles[f.index()].iter().all(|v| frozen[v.index()]);
     for (_, _, angle) in angles(&normals, connectivity).filter(|a| a.2.is_finite()) {
         figures.max_deg = figures.max_deg.max(angle);
         figures.histogram[((angle / 10.0) as usize).min(17)] += 1;
     }
     for f in mesh.faces() {
-        let around: DVec3 = (0..3)
-            .map(|k| connectivity.neighbor(f, k))
-            .filter(|g| g.is_some())
-            .map(|g| normals[g.index()])
-            .sum();
-        figures.folded_faces += usize::from(normals[f.index()].dot(around.normalize_or_zero()) < FOLDED);
+        let neighbors = || (0..3).map(|k| connectivity.neighbor(f, k)).filter(|g| g.is_some());
+        let around: DVec3 = neighbors().map(|g| normals[g.index()]).sum();
+        if normals[f.index()].dot(around.normalize_or_zero()) < FOLDED {
+            figures.folded_faces += 1;
+            figures.folded_held += usize::from(still(f) && neighbors().all(still));
+        }
     }
     figures
 }
