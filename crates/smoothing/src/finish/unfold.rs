@@ -2,7 +2,9 @@
 //!
 //! A face at the bottom of a dent, or on top of a pimple, can have three edges that are all a little less sharp than a spike and
 //! point against the mean of its neighbours all the same. On the nine reference parts 17 such faces were left, now 3, all between
-//! frozen vertices and outlines of flat faces. The vertices of the face
+//! frozen vertices and outlines of flat faces: on bell-crank the face and its neighbours have frozen vertices alone; on bridge two corners
+//! could slide in their plane, but within one edge length that leaves an edge sharper than any there before (142 and 137 degrees instead
+//! of 125 and 130, by random search over both corners), and without one they would have to go 1.9 and 1.3 edge lengths. The vertices of the face
 //! and the tips of its neighbours are searched for better places, as for spikes, with limits that fall until the fold is gone. Where that
 //! does not do, because several faces are folded into each other, the free vertices around become a membrane on what is
 //! held around them.
