@@ -16,7 +16,6 @@
 //! Not guaranteed: that corners are narrower than 180 degrees; they are penalized in the matching, reported by
 //! validation, and refused above `max_corner_angle` where that is set.
 
-mod dissolve;
 mod doublets;
 mod dual;
 mod error;
@@ -33,7 +32,6 @@ mod spokes;
 mod straighten;
 mod verify;
 
-pub use dissolve::{Dissolved, dissolve};
 pub use dual::match_quads;
 pub use error::QuadMatchingError;
 pub use layout::{MacroEdge, QuadLayout, RegionFace, Side};
