@@ -117,11 +117,17 @@ fn killed_runs_leave_nothing_that_misleads_the_next_one() {
             .spawn()
             .unwrap();
         let mut written = std::io::BufRead::lines(std::io::BufReader::new(child.stdout.take().unwrap()));
-        let until = next(lines as u64);
+        // The first of three begins on an empty cache and dies right after a line of its first half: it is in work however
+        // the machine's load has changed since the lines were timed.
+        let first = round % 3 == 0;
+        let until = next(if first { lines as u64 / 2 } else { lines as u64 });
         if until > 0 {
             written.nth(until as usize - 1);
         }
-        std::thread::sleep(between_lines.mul_f64(next(2000) as f64 / 1000.0));
+        let pause = between_lines.mul_f64(next(2000) as f64 / 1000.0);
+        if !first {
+            std::thread::sleep(pause);
+        }
         child.kill().unwrap();
         in_work += usize::from(!child.wait().unwrap().success());
         if round % 3 != 2 && round + 1 != rounds {
@@ -139,7 +145,7 @@ fn killed_runs_leave_nothing_that_misleads_the_next_one() {
         assert_eq!(shop.topipe(&["cache", "verify"]).code, 0, "round {round}");
         shop = Workshop::with_part("y-form", FIT);
     }
-    // One in three begins on an empty cache; a kill on what is nearly done may come too late.
+    // One in three is in work for certain; a kill on what is nearly done may come too late.
     assert!(3 * in_work >= rounds, "{in_work} of {rounds} kills met a run in work");
 }
 
