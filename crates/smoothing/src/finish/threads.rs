@@ -47,7 +47,7 @@ impl Finish<'_> {
             a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a))
         };
         let mut drawn: Vec<bool> = (0..self.mesh.face_count())
-            .map(|f| FaceId::new(f))
+            .map(FaceId::new)
             .map(|f| longest(positions, f) < DRAWN * DRAWN * longest(&self.mesh.positions, f))
             .collect();
         let mut groups = Vec::new();
