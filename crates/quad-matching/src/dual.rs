@@ -133,24 +133,8 @@ pub fn match_quads(
     };
     crate::doublets::merge(&mut layout);
     crate::doublets::compact(&mut layout);
-    check_corners(&layout, parameters)?;
+    layout.check_corners(parameters)?;
     Ok(layout)
-}
-
-/// The gate on corner angles.
-fn check_corners(layout: &QuadLayout, parameters: &Parameters) -> Result<(), QuadMatchingError> {
-    let limit = parameters.max_corner_angle;
-    if limit == 0.0 {
-        return Ok(());
-    }
-    let angles = layout.corner_angles();
-    let widest = |corners: &[f64; 4]| corners.iter().fold(0.0f64, |a, &b| a.max(b)).to_degrees();
-    let above = angles.iter().filter(|corners| widest(corners) > limit).count();
-    if above > 0 {
-        let widest = angles.iter().map(widest).fold(0.0, f64::max);
-        return Err(QuadMatchingError::ReflexCorner { quads: above, limit, widest });
-    }
-    Ok(())
 }
 
 /// Drops the macro-edges that were removed by the matching and renumbers the sides.

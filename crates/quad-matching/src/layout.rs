@@ -1,6 +1,7 @@
 //! The quadrilateral layout: macro-vertices, macro-edges and macro-quads over a refined mesh.
 
 use crate::pairing::face_angle;
+use crate::{Parameters, QuadMatchingError};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use topipe_mesh::{FeatureKind, HalfEdgeId, Part, RegionId, VertexId};
@@ -63,6 +64,22 @@ pub struct QuadLayout {
 }
 
 impl QuadLayout {
+    /// The gate on corner angles.
+    pub(crate) fn check_corners(&self, parameters: &Parameters) -> Result<(), QuadMatchingError> {
+        let limit = parameters.max_corner_angle;
+        if limit == 0.0 {
+            return Ok(());
+        }
+        let angles = self.corner_angles();
+        let widest = |corners: &[f64; 4]| corners.iter().fold(0.0f64, |a, &b| a.max(b)).to_degrees();
+        let above = angles.iter().filter(|corners| widest(corners) > limit).count();
+        if above > 0 {
+            let widest = angles.iter().map(widest).fold(0.0, f64::max);
+            return Err(QuadMatchingError::ReflexCorner { quads: above, limit, widest });
+        }
+        Ok(())
+    }
+
     /// Stands in [`Self::quad_of_face`] for faces that lie in a region face.
     pub const NO_QUAD: u32 = u32::MAX;
 

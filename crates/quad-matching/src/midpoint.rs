@@ -40,7 +40,7 @@ pub(crate) fn subdivide(
     let quad_of_face = tiled.tile_of_face;
     let region_faces = faces.into_iter().map(halved).collect();
     let (part, _) = tiled.refiner.finish();
-    Ok(QuadLayout {
+    let layout = QuadLayout {
         part,
         vertices,
         edges,
@@ -49,7 +49,9 @@ pub(crate) fn subdivide(
         region_faces,
         tiles: tiling.tile_count() as u32,
         macro_triangles: 0,
-    })
+    };
+    layout.check_corners(parameters)?;
+    Ok(layout)
 }
 
 /// A region face whose sides are the halves of what they were.

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use topipe_mesh::import::{ImportOptions, Source, read_source};
 use topipe_mesh::{DVec3, FaceId, Part, Region, RegionId, RegionShape, TriangleMesh, VertexId};
 use topipe_progress::Progress;
-use topipe_quad_matching::{Pairing, Parameters, QuadLayout, match_quads, verify};
+use topipe_quad_matching::{Pairing, Parameters, QuadLayout, QuadMatchingError, match_quads, verify};
 use topipe_smoothing::smooth;
 use topipe_tiling::{Method, Tiling, tile, tile_sized};
 
@@ -43,6 +43,22 @@ fn laid_out(tiling: &Tiling) -> QuadLayout {
 fn irregular(layout: &QuadLayout) -> usize {
     let regular = |a: &f64| (15.0..=165.0).contains(&a.to_degrees());
     layout.corner_angles().iter().filter(|corners| !corners.iter().all(regular)).count()
+}
+
+#[test]
+fn the_gate_on_corners_holds_here_too() {
+    let tiling = tiled(&smoothed("y-form"), &tiling_parameters());
+    let widest = laid_out(&tiling).corner_angles().into_iter().flatten().fold(0.0, f64::max).to_degrees();
+    let gated = |limit: f64| {
+        let parameters =
+            Parameters { pairing: Pairing::Midpoint, max_corner_angle: limit, ..Default::default() };
+        match_quads(&tiling, &parameters, &Progress::silent())
+    };
+    assert!(gated(widest + 1e-6).is_ok());
+    let refused = gated(widest - 1.0).unwrap_err();
+    assert!(
+        matches!(refused, QuadMatchingError::ReflexCorner { quads: 1.., widest: w, .. } if (w - widest).abs() < 1e-9)
+    );
 }
 
 #[test]

@@ -23,7 +23,7 @@ mod spelling;
 pub use spelling::{real, references, text};
 
 use glam::DVec3;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 use std::io::{self, Write};
 
 /// Which application protocol a file follows. The geometry is the same in both.
@@ -80,7 +80,7 @@ pub struct Entities<'a, W: Write> {
     shape: u64,
     units: u64,
     /// Points by their coordinates: what is the same place bit for bit is one entity.
-    points: HashMap<[u64; 3], u64>,
+    points: FxHashMap<[u64; 3], u64>,
     plane_context: Option<u64>,
 }
 
@@ -93,8 +93,15 @@ impl<'a, W: Write> Entities<'a, W> {
         writeln!(out, "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(('{description}'),'2;1');")?;
         writeln!(out, "FILE_NAME('{name}','1970-01-01T00:00:00',(''),(''),'topipe','topipe','');")?;
         writeln!(out, "FILE_SCHEMA(('{schema}'));\nENDSEC;\nDATA;")?;
-        let mut file =
-            Self { out, next: 1, name, shape: 0, units: 0, points: HashMap::new(), plane_context: None };
+        let mut file = Self {
+            out,
+            next: 1,
+            name,
+            shape: 0,
+            units: 0,
+            points: FxHashMap::default(),
+            plane_context: None,
+        };
         let name = &file.name.clone();
         let context = file.add(&format!("APPLICATION_CONTEXT('{application}')"))?;
         file.add(&format!(
