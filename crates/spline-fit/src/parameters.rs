@@ -83,13 +83,6 @@ impl Parameters {
         (self.tolerance * mesh.diagonal()).min(self.tolerance_mm.unwrap_or(f64::INFINITY))
     }
 
-    /// The same for a patch on its own, with seven significant bits: an edit that changes the diagonal a little leaves the keys of
-    /// patches that it does not touch.
-    pub(crate) fn largest_distance_of_patch(&self, mesh: &TriangleMesh) -> f64 {
-        let kept = f64::MANTISSA_DIGITS - 7;
-        f64::from_bits(self.largest_distance(mesh).to_bits() >> kept << kept)
-    }
-
     /// Checks the ranges; returns the basis they describe.
     pub fn basis(&self) -> Result<Basis, SplineFitError> {
         let refuse = |field, value: String, range| Err(SplineFitError::Parameter { field, value, range });

@@ -11,16 +11,15 @@ use crate::{Parameters, SplineFitError};
 use topipe_mesh::DVec3;
 use topipe_progress::{UnitKey, Units};
 
-/// The key of a patch; `tolerance` is in mm.
+/// The key of a patch.
 pub(crate) fn key(
     samples: &PatchSamples,
     borders: &[Border; 4],
     corners: &[DVec3; 4],
     parameters: &Parameters,
-    tolerance: f64,
 ) -> UnitKey {
     let mut hasher = UnitKey::of("spline patch")
-        .f64s(&[parameters.lambda, tolerance, samples.area])
+        .f64s(&[parameters.lambda, samples.area])
         .u64(parameters.foot_point_rounds.into());
     let mut numbers = Vec::new();
     for sample in &samples.samples {

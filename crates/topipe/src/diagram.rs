@@ -89,9 +89,7 @@ impl Node {
         let (title, subtitle) = (title.to_owned(), subtitle.to_owned());
         Self { title, subtitle, look, column: 0, middle: 0.0, edges: 0 }
     }
-}
 
-impl Node {
     fn height(&self) -> f64 {
         match self.look {
             Look::Passage => 0.0,

@@ -28,7 +28,7 @@ const RINGS: usize = 3;
 const STEPS: [usize; 4] = [1, 3, 10, 40];
 
 /// No edge around what was a fold may be sharper than this, or than one there before: cosine of 125 degrees.
-const SHARP: f64 = -0.574;
+pub(super) const SHARP: f64 = -0.574;
 
 impl Finish<'_> {
     /// The folded faces that can be moved, or whose neighbours can.
