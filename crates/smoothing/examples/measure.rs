@@ -6,10 +6,11 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 use topipe_mesh::import::{ImportOptions, Source, read_source};
 use topipe_mesh::{Connectivity, Part, RegionShape, TriangleMesh};
-use topipe_progress::Progress;
+use topipe_progress::{Listener, Progress};
 use topipe_smoothing::{Method, Parameters, smooth};
 
 /// Faces whose normal is more than 120 degrees from the mean of their neighbours', and the dihedral histogram.
@@ -124,6 +125,42 @@ fn borders(part: &Part) -> String {
     format!("borders: {tongues} tongues, {pinches} pinches")
 }
 
+/// Prints remarks.
+struct Remarks;
+
+impl Listener for Remarks {
+    fn step(&self, _: u64, _: u64, _: &str) {}
+
+    fn remark(&self, text: &str) {
+        println!("  {text}");
+    }
+
+    fn interrupted(&self) -> bool {
+        false
+    }
+}
+
+/// The smallest faces, as shares of the mean area, and the least quality (1 for an equilateral face, 0 for a needle).
+fn smallest(mesh: &TriangleMesh) -> String {
+    let mean = mesh.area() / mesh.face_count() as f64;
+    let area = |f| mesh.area_vector(f).length() / 2.0;
+    let mut areas: Vec<f64> = mesh.faces().map(|f| area(f) / mean).collect();
+    areas.sort_by(f64::total_cmp);
+    let quality = |f| {
+        let [a, b, c] = mesh.corners(f);
+        let squares = a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
+        48f64.sqrt() * area(f) / squares
+    };
+    let worst = mesh.faces().map(quality).fold(1.0, f64::min);
+    let below = |share| areas.partition_point(|a| *a < share);
+    format!(
+        "smallest face {:.1e} of the mean area, {} below 0.001, {} below 0.01; least quality {worst:.4}",
+        areas[0],
+        below(0.001),
+        below(0.01)
+    )
+}
+
 fn main() {
     let mut write = None;
     let mut parameters = Parameters::default();
@@ -169,7 +206,7 @@ fn case(path: &str, parameters: &Parameters, write: Option<&str>) {
     };
     println!("{path}: {} faces", part.mesh.face_count());
     let start = Instant::now();
-    let smoothed = match smooth(&part, parameters, &Progress::silent()) {
+    let smoothed = match smooth(&part, parameters, &Progress::new(Arc::new(Remarks))) {
         Ok(smoothed) => smoothed,
         Err(error) => return println!("  {error}"),
     };
@@ -209,6 +246,7 @@ fn case(path: &str, parameters: &Parameters, write: Option<&str>) {
     println!("  before: {}", quality(&part.mesh));
     println!("  after:  {}", quality(&smoothed.mesh));
     println!("  after:  {}", spikes(&smoothed.mesh, &smoothed));
+    println!("  after:  {}", smallest(&smoothed.mesh));
     println!("  free surface before: {}", free_surface(&part.mesh, &smoothed));
     println!("  free surface after:  {}", free_surface(&smoothed.mesh, &smoothed));
     if let Some(directory) = write {

@@ -25,7 +25,7 @@
 //! # Non-guarantees
 //! - Slots and other openings are kept where their walls are planes and arcs of cylinders, or labelled non-design; their
 //!   walls are regions of their own.
-//! - A frozen spike stays: of the 11,150 edges beyond 120 degrees on the nine reference parts 36 are left (0.3 %), all but
+//! - A frozen spike stays: of the 11,150 edges beyond 120 degrees on the nine reference parts 34 are left (0.3 %), all but
 //!   a few with three or four of their four vertices frozen; of the 4,414 faces that point against the mean of their
 //!   neighbours 3, between frozen vertices and outlines of flat faces. None is turned over: the surface does not pass through itself.
 //!

@@ -7,6 +7,8 @@
 //! on from there.
 
 use super::Finish;
+use rayon::prelude::*;
+use std::collections::HashSet;
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
 
 /// First and last step of the search, in mean lengths of the edges at the vertex.
@@ -20,6 +22,9 @@ const LEAST_AREA: f64 = 0.5;
 
 /// A place is better when it takes at least this share of what is too sharp.
 const GAIN: f64 = 0.01;
+
+/// A face over so many cells is looked at without asking which.
+const MANY_CELLS: i64 = 64;
 
 impl Finish<'_> {
     /// The vertices around `spikes` that may move freely, in order.
@@ -54,6 +59,88 @@ impl Finish<'_> {
             }
         }
         moved
+    }
+
+    /// Relieves each edge that is still too sharp by itself, the sharpest first, where that makes no edge around sharper than the
+    /// sharpest there, folds no face and lets no triangle through another; says whether it did one.
+    pub(super) fn relieve_what_is_left(&self, positions: &mut [DVec3]) -> bool {
+        let before = positions.to_vec();
+        let mut spikes = self.spikes(positions);
+        let cosine = |h: &HalfEdgeId| {
+            let normal = |h: HalfEdgeId| self.normal(&before, h.face());
+            normal(*h).dot(normal(self.connectivity.twin(*h)))
+        };
+        spikes.sort_by(|a, b| cosine(a).total_cmp(&cosine(b)));
+        for spike in spikes {
+            let around = self.around_spikes(&[spike]);
+            let faces = self.with_neighbors(self.faces_at(&around));
+            let folds = |positions: &[DVec3]| faces.iter().filter(|f| self.is_folded(positions, **f)).count();
+            let here: Vec<DVec3> = around.iter().map(|&v| positions[v]).collect();
+            let (folded, sharpest) = (folds(positions), self.sharpest(positions, &faces));
+            if self.relieve(positions, &around, self.spike)
+                && (folds(positions) > folded || self.sharpest(positions, &faces) < sharpest)
+            {
+                around.iter().zip(here).for_each(|(&v, p)| positions[v] = p);
+            }
+        }
+        let mut moved: Vec<usize> = (0..before.len()).filter(|&v| positions[v] != before[v]).collect();
+        // What passes through something goes back, and so do its neighbours that moved.
+        while self.embedded && !moved.is_empty() {
+            let ring: Vec<FaceId> = self.faces_at(&moved);
+            let mut back: Vec<VertexId> = self
+                .crossings_of(positions, &ring)
+                .into_iter()
+                .flatten()
+                .flat_map(|f| self.mesh.triangles[f.index()])
+                .flat_map(|v| self.connectivity.outgoing(v))
+                .map(|h| self.connectivity.target(h))
+                .filter(|v| positions[v.index()] != before[v.index()])
+                .collect();
+            if back.is_empty() {
+                break;
+            }
+            back.sort_unstable();
+            back.dedup();
+            back.iter().for_each(|v| positions[v.index()] = before[v.index()]);
+            moved.retain(|&v| positions[v] != before[v]);
+        }
+        !moved.is_empty()
+    }
+
+    /// Pairs of faces that pass through each other, of which at least one is in `faces`, which is in order.
+    fn crossings_of(&self, positions: &[DVec3], faces: &[FaceId]) -> Vec<[FaceId; 2]> {
+        let bounds = |f: FaceId| {
+            let corners = self.mesh.triangles[f.index()].map(|v| positions[v.index()]);
+            let [a, b, c] = corners;
+            (a.min(b).min(c), a.max(b).max(c))
+        };
+        // A grid whose cells are as large as the largest of them.
+        let size = faces
+            .iter()
+            .map(|&f| bounds(f))
+            .fold(self.edge, |size, (low, high)| size.max((high - low).max_element()));
+        let cells = |f: FaceId| {
+            let (low, high) = bounds(f);
+            let [low, high] = [low, high].map(|p| (p / size).floor().as_i64vec3());
+            let count = (high - low + 1).element_product();
+            let range = move |k: usize| low[k]..=high[k];
+            let all = move || {
+                range(0).flat_map(move |x| range(1).flat_map(move |y| range(2).map(move |z| [x, y, z])))
+            };
+            (count, all)
+        };
+        let taken: HashSet<[i64; 3]> = faces.iter().flat_map(|&f| cells(f).1()).collect();
+        let near: Vec<FaceId> = (0..self.mesh.face_count())
+            .into_par_iter()
+            .map(FaceId::new)
+            .filter(|&f| {
+                let (count, cells) = cells(f);
+                count > MANY_CELLS || cells().any(|c| taken.contains(&c))
+            })
+            .collect();
+        let mut found = self.crossings_between(positions, &near);
+        found.retain(|pair| pair.iter().any(|f| faces.binary_search(f).is_ok()));
+        found
     }
 
     /// Looks for a better place for `v`.

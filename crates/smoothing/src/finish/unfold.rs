@@ -46,7 +46,7 @@ impl Finish<'_> {
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    fn is_folded(&self, positions: &[DVec3], face: FaceId) -> bool {
+    pub(super) fn is_folded(&self, positions: &[DVec3], face: FaceId) -> bool {
         let normal = |f: FaceId| self.normal(positions, f);
         let neighbors = || (0..3).map(|k| self.connectivity.neighbor(face, k)).filter(|g| g.is_some());
         let movable = |f: FaceId| self.mesh.triangles[f.index()].iter().any(|v| self.is_free(v.index()));
@@ -113,13 +113,9 @@ impl Finish<'_> {
         if !self.is_folded(positions, fold) {
             return true;
         }
-        let c = self.connectivity;
-        let mut faces = vec![fold];
-        faces.extend(vertices.iter().flat_map(|&v| c.outgoing(VertexId::new(v))).map(|h| h.face()));
-        let ring: Vec<FaceId> = faces.iter().flat_map(|&f| (0..3).map(move |k| c.neighbor(f, k))).collect();
-        faces.extend(ring.into_iter().filter(|f| f.is_some()));
-        faces.sort_unstable();
-        faces.dedup();
+        let mut faces = self.faces_at(vertices);
+        faces.push(fold);
+        let faces = self.with_neighbors(faces);
         let folds = |positions: &[DVec3]| faces.iter().filter(|f| self.is_folded(positions, **f)).count();
         let before: Vec<DVec3> = vertices.iter().map(|&v| positions[v]).collect();
         let (count, sharp) = (folds(positions), self.sharpest(positions, &faces));
@@ -139,6 +135,18 @@ impl Finish<'_> {
         !self.is_folded(positions, fold)
     }
 
+    /// These faces and their neighbours, in order.
+    pub(super) fn with_neighbors(&self, mut faces: Vec<FaceId>) -> Vec<FaceId> {
+        let neighbors = |f: &FaceId| {
+            [0, 1, 2].map(|k| self.connectivity.neighbor(*f, k)).into_iter().filter(|g| g.is_some())
+        };
+        let ring: Vec<FaceId> = faces.iter().flat_map(neighbors).collect();
+        faces.extend(ring);
+        faces.sort_unstable();
+        faces.dedup();
+        faces
+    }
+
     /// The cosine of the largest angle at an edge of `faces`.
     pub(super) fn sharpest(&self, positions: &[DVec3], faces: &[FaceId]) -> f64 {
         let cosine = |f: FaceId, k: usize| {
@@ -156,20 +164,31 @@ impl Finish<'_> {
             let p = positions[self.connectivity.target(h).index()];
             (low, high) = (low.min(p - reach), high.max(p + reach));
         }
-        let near = |t: &&[VertexId; 3]| {
+        let near = |t: &[VertexId; 3]| {
             let corners = t.map(|v| positions[v.index()]);
             let least = corners.iter().fold(DVec3::INFINITY, |a, p| a.min(*p));
             let most = corners.iter().fold(DVec3::NEG_INFINITY, |a, p| a.max(*p));
             least.cmple(high).all() && most.cmpge(low).all()
         };
-        let chosen: Vec<[VertexId; 3]> = self.mesh.triangles.par_iter().filter(near).copied().collect();
-        let mut names: Vec<VertexId> = chosen.iter().flatten().copied().collect();
+        let near: Vec<FaceId> = (0..self.mesh.face_count())
+            .into_par_iter()
+            .map(FaceId::new)
+            .filter(|f| near(&self.mesh.triangles[f.index()]))
+            .collect();
+        self.crossings_between(positions, &near).len()
+    }
+
+    /// Pairs of these faces that pass through each other.
+    pub(super) fn crossings_between(&self, positions: &[DVec3], faces: &[FaceId]) -> Vec<[FaceId; 2]> {
+        let chosen = || faces.iter().map(|f| self.mesh.triangles[f.index()]);
+        let mut names: Vec<VertexId> = chosen().flatten().collect();
         names.sort_unstable();
         names.dedup();
         let triangles =
-            chosen.iter().map(|t| t.map(|v| VertexId::new(names.partition_point(|n| *n < v)))).collect();
+            chosen().map(|t| t.map(|v| VertexId::new(names.partition_point(|n| *n < v)))).collect();
         let positions = names.iter().map(|v| positions[v.index()]).collect();
-        crossings(&TriangleMesh { positions, triangles }).len()
+        let found = crossings(&TriangleMesh { positions, triangles });
+        found.into_iter().map(|c| c.faces.map(|f| faces[f.index()])).collect()
     }
 
     /// The vertices that may move freely up to `rings` rings from those of `faces`, in order.
@@ -187,9 +206,9 @@ impl Finish<'_> {
             let ring: Vec<VertexId> =
                 found.iter().flat_map(|&v| c.outgoing(v)).map(|h| c.target(h)).collect();
             found.extend(ring);
-            found.sort_unstable();
-            found.dedup();
         }
+        found.sort_unstable();
+        found.dedup();
         found.into_iter().map(|v| v.index()).filter(|&v| self.is_free(v)).collect()
     }
 }

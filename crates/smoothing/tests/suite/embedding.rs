@@ -89,10 +89,35 @@ fn threads_are_drawn_in() {
         let part = read(case);
         let result = smoothed(&part, &Parameters::default());
         assert_eq!(threads(&part.mesh, &result.mesh), 0, "{case}");
+        // The faces of a membrane are no dust.
+        let mean = result.mesh.area() / result.mesh.face_count() as f64;
+        let least = result.mesh.faces().map(|f| result.mesh.area_vector(f).length() / 2.0 / mean);
+        assert!(least.fold(f64::INFINITY, f64::min) > 1e-4, "{case}");
         if case == "bracket" {
             let left = smoothed(&part, &Parameters { spike_angle: 180.0, ..Parameters::default() });
             assert!(threads(&part.mesh, &left.mesh) > 0);
         }
+    }
+}
+
+/// What restores the volume turns faces. It must not close again what was opened to the limit.
+#[test]
+fn few_edges_are_left_beyond_the_limit() {
+    for (case, most) in [("bracket", 10), ("y-form", 1)] {
+        let part = read(case);
+        let result = smoothed(&part, &Parameters::default());
+        let connectivity = Connectivity::build(&result.mesh).expect("a manifold");
+        let limit = Parameters::default().spike_angle.to_radians().cos();
+        let can_move = |f: FaceId| result.mesh.triangles[f.index()].iter().any(|v| !result.frozen[v.index()]);
+        let sharp = |mesh: &TriangleMesh| {
+            let is_sharp = |h: &topipe_mesh::HalfEdgeId| {
+                let (f, g) = (h.face(), connectivity.twin(*h).face());
+                mesh.normal(f).dot(mesh.normal(g)) < limit && (can_move(f) || can_move(g))
+            };
+            connectivity.edges().filter(is_sharp).count()
+        };
+        let (before, after) = (sharp(&part.mesh), sharp(&result.mesh));
+        assert!(after <= most && before > 500, "{case}: {after} of {before}");
     }
 }
 
