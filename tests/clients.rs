@@ -240,9 +240,31 @@ fn check_mesh(python: &Path, folder: &Path, case: &str) {
 #[test]
 fn the_bracket_opens_as_a_solid_with_its_holes() {
     let Some(python) = clients() else { return };
-    let folder = run_pipeline("bracket", false);
+    let folder = run_pipeline_with("bracket", false, "\"part.iges\" = \"surface\"\n");
     check_mesh(python, folder.path(), "bracket");
     check_solid(python, folder.path(), [12.0, 8.0, 5.0, 3.0]);
+    check_iges(python, folder.path());
+}
+
+/// The IGES file is the same solid as the report speaks of.
+fn check_iges(python: &Path, folder: &Path) {
+    let report = report(folder);
+    let solid = check(python, "check_step.py", &["part.iges"], folder);
+    println!("{solid:#}");
+    assert_eq!(
+        (&solid["solids"], &solid["closed"], &solid["valid"]),
+        (&1.into(), &true.into(), &true.into())
+    );
+    close("genus", number(&solid, "/genus"), number(&report, "/original/genus"), 0.0);
+    let (volume, ours) = (number(&solid, "/volume_mm3"), number(&report, "/surface/volume_mm3"));
+    close("our volume over that of the IGES file", ours / volume, 1.0, 1e-6);
+    for (theirs, ours) in [("bspline", "patches"), ("plane", "planes"), ("cylinder", "cylinders")] {
+        let count = number(&solid, &format!("/surface_kinds/{theirs}"));
+        close(ours, count, number(&report, &format!("/surface/{ours}")), 0.0);
+    }
+    // Readers interpolate splines on cylinders (bracket: 5e-5 mm).
+    assert!(number(&solid, "/gap_mm") <= 1e-3, "gap");
+    assert!(number(&solid, "/max_tolerance_mm") <= 1e-3, "tolerance");
 }
 
 #[test]

@@ -186,6 +186,18 @@ mod tests {
         assert_eq!((count("=PLANE("), count("=CYLINDRICAL_SURFACE(")), (2, 2));
         assert_eq!((count("'hole 1, diameter 6 mm'"), count("'boss 1, diameter 10 mm'")), (1, 1));
         assert!(file.contains("AP242_MANAGED_MODEL_BASED_3D_ENGINEERING"));
+
+        let mut file = Vec::new();
+        crate::iges::write(&surface, "tube", &mut file).unwrap();
+        let file = String::from_utf8(file).unwrap();
+        let directory = file.lines().filter(|line| line.as_bytes()[72] == b'D').step_by(2);
+        let kinds: Vec<u32> = directory.map(|line| line[..8].trim().parse().unwrap()).collect();
+        let count = |kind: u32| kinds.iter().filter(|k| **k == kind).count();
+        // Solid, shell, faces, loops (of walls one, with its seam twice), lists of edges and vertices.
+        assert_eq!([186, 514, 510, 508, 504, 502].map(count), [1, 1, 4, 6, 1, 1]);
+        assert_eq!([190, 192, 100, 110, 126, 128].map(count), [2, 2, 4, 2, 0, 0]);
+        let wall = |line: &&str| line.starts_with("508,4,0,");
+        assert_eq!(file.lines().filter(wall).count(), 2);
     }
 
     #[test]

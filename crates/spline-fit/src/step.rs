@@ -10,8 +10,7 @@
 mod geometry;
 mod knots;
 mod pcurves;
-mod seams;
-mod style;
+pub(crate) mod style;
 
 use crate::SplineSurface;
 use crate::shells::shells;

@@ -6,14 +6,14 @@ use topipe_mesh::RegionShape;
 use topipe_step::{Entities, real, references};
 
 /// Red, green, blue from 0 to 1.
-type Color = [f64; 3];
+pub(crate) type Color = [f64; 3];
 
-const FREE_SURFACE: Color = [0.72, 0.75, 0.78];
+pub(crate) const FREE_SURFACE: Color = [0.72, 0.75, 0.78];
 const FLAT: Color = [0.55, 0.68, 0.85];
 const HOLE: Color = [0.93, 0.62, 0.3];
 const BOSS: Color = [0.6, 0.78, 0.55];
 
-fn color(shape: &RegionShape) -> Color {
+pub(crate) fn color(shape: &RegionShape) -> Color {
     match shape {
         RegionShape::Plane { .. } => FLAT,
         RegionShape::Cylinder { hole: true, .. } => HOLE,

@@ -1,4 +1,4 @@
-//! Spline surfaces as STEP, resampled as STL and OBJ, and as control nets in JSON.
+//! Spline surfaces as STEP and IGES, resampled as STL and OBJ, and as control nets in JSON.
 //!
 //! `.step` and `.stp` follow AP214, `.ap242.step` and `.ap242.stp` AP242. `.fine.stl` and `.fine.obj` are ten times
 //! nearer to the surface than `.stl` and `.obj`.
@@ -8,7 +8,7 @@ use std::io::Write;
 use topipe_engine::{ExportError, Exporter};
 use topipe_mesh::{DVec3, TriangleMesh, write};
 use topipe_spline_fit::step::{self, Protocol};
-use topipe_spline_fit::{SplineSurface as Surface, control_nets};
+use topipe_spline_fit::{SplineSurface as Surface, control_nets, iges};
 
 /// Largest distance of a resampled mesh from the surface over the diagonal of its corner points. On the bracket 2e-5
 /// gives 8 million triangles (400 MB of STL), which no viewer likes, 5e-4 a file of the order of the input.
@@ -18,11 +18,13 @@ const FINE_CHORD: f64 = 5e-5;
 
 type Writer = fn(&Surface, &str, &mut dyn Write) -> Result<(), ExportError>;
 
-const WRITERS: [(&str, Writer); 9] = [
+const WRITERS: [(&str, Writer); 11] = [
     ("step", |surface, name, mut file| Ok(step::write(surface, name, Protocol::Ap214, &mut file)?)),
     ("stp", |surface, name, mut file| Ok(step::write(surface, name, Protocol::Ap214, &mut file)?)),
     ("ap242.step", |surface, name, mut file| Ok(step::write(surface, name, Protocol::Ap242, &mut file)?)),
     ("ap242.stp", |surface, name, mut file| Ok(step::write(surface, name, Protocol::Ap242, &mut file)?)),
+    ("iges", |surface, name, mut file| Ok(iges::write(surface, name, &mut file)?)),
+    ("igs", |surface, name, mut file| Ok(iges::write(surface, name, &mut file)?)),
     ("stl", |surface, _, mut file| Ok(write::stl(&resample(surface, CHORD), &mut file)?)),
     ("obj", |surface, _, mut file| Ok(write::obj(&resample(surface, CHORD), &mut file)?)),
     ("fine.stl", |surface, _, mut file| Ok(write::stl(&resample(surface, FINE_CHORD), &mut file)?)),
