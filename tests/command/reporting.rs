@@ -57,13 +57,53 @@ fn a_run_that_failed_has_a_report_of_what_there_is() {
     let ended = shop.topipe(&["run", "box.toml"]);
     assert_eq!(ended.code, 3, "{}", ended.stderr);
     let page = shop.read("topipe-out/box/report.html");
-    for part in
-        ["The run did not finish", "Stage smooth failed", "skipped", "The report of stage check is missing"]
-    {
+    for part in [
+        "The run did not finish",
+        "Stage smooth failed",
+        "skipped",
+        "The report of stage check is missing",
+        // Its figures are measured on what there is: the mesh, and nothing else.
+        "measured for this page, on the results there are",
+        "Volume enclosed by the mesh",
+        "Smoothed mesh: not in this report",
+    ] {
         assert!(page.contains(part), "no {part}");
     }
+    assert!(!page.contains("Volume of the smoothed mesh"));
     // Of the mesh there is a picture all the same.
     assert!(page.contains("\"id\":\"original\""));
+}
+
+/// The whole chain, with a limit that no surface keeps.
+#[test]
+fn a_run_that_breaks_a_required_limit_has_a_report_with_the_figure() {
+    let shop = with_report();
+    let beyond = "\n[stage.tiles]\nkind = \"tiling\"\ninput = \"smooth\"\n\
+        [stage.quads]\nkind = \"quad-matching\"\ninput = \"tiles\"\n\
+        [stage.surface]\nkind = \"spline-fit\"\ninput = \"quads\"\n";
+    shop.edit(
+        "mesh = \"smooth\"",
+        "mesh = \"smooth\"\nsurface = \"surface\"\nmax_deviation_mm = 1e-9\nrequire = true",
+    );
+    shop.write("box.toml", &(shop.read("box.toml") + beyond));
+    let ended = shop.topipe(&["run", "box.toml"]);
+    assert_eq!(ended.code, 1, "{}", ended.stderr);
+    assert!(ended.stderr.contains("surface.deviation.max_mm is"), "{}", ended.stderr);
+    assert!(ended.stdout.contains("report.html  written; open it"), "{}", ended.stdout);
+    let page = shop.read("topipe-out/box/report.html");
+    for part in [
+        "The run did not finish; <a href=\"#figures\">",
+        "Stage check failed: ",
+        "measured for this page, on the results there are",
+        "Volume of the CAD solid",
+        "Limit that was set",
+        "at most 1.00e-9",
+    ] {
+        assert!(page.contains(part), "no {part}");
+    }
+    // Nothing has changed since: the file is not written again.
+    let again = shop.topipe(&["run", "box.toml"]);
+    assert_eq!((again.code, again.stdout.contains("report.html")), (1, false), "{}", again.stdout);
 }
 
 #[test]

@@ -52,6 +52,8 @@ pub struct Figures {
     pub stage: String,
     /// Its sections.
     pub value: Value,
+    /// What is to be known of all of them. Empty if there is nothing.
+    pub note: String,
 }
 
 /// What became of a stage.

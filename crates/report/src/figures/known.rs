@@ -119,7 +119,7 @@ pub(super) const KNOWN: &[Figure] = &[
     figure(
         "surface.deviation.max_mm",
         "Largest distance from the smoothed mesh",
-        "Largest distance",
+        "Largest distance from the mesh",
         Share(2e-3, "surface.deviation.max_rel"),
     ),
     figure("surface.deviation.mean_rel", "Mean distance over the diagonal of the part", "", No),

@@ -52,6 +52,7 @@ pub(super) fn figures_section(all: &[Figures], sections: &[(String, Vec<Section>
             }
             @for ((stage, sections), figures) in sections.iter().zip(all) {
                 @if all.len() > 1 { h3 { "Stage " (stage) } }
+                @if !figures.note.is_empty() { p.note { (figures.note) } }
                 div.sections {
                     @for section in sections { (figure_section(section)) }
                 }

@@ -83,6 +83,10 @@ pub fn html(document: &Document) -> String {
     page.into_string()
 }
 
+fn out_of_limits(broken: usize) -> Markup {
+    html! { a href="#figures" { (broken) @if broken == 1 { " figure" } @else { " figures" } " out of limits" } }
+}
+
 fn banner(document: &Document, broken: usize) -> Markup {
     html! {
         header.banner {
@@ -96,10 +100,13 @@ fn banner(document: &Document, broken: usize) -> Markup {
                 }
             }
             p.verdict.bad[!document.problems.is_empty()].warn[document.problems.is_empty() && broken > 0] {
-                @if !document.problems.is_empty() { "The run did not finish" }
+                @if !document.problems.is_empty() {
+                    "The run did not finish"
+                    @if broken > 0 { "; " (out_of_limits(broken)) }
+                }
                 @else if document.figures.is_empty() { "Finished; nothing was validated" }
                 @else if broken == 0 { "Finished; all figures within their limits" }
-                @else { "Finished; " a href="#figures" { (broken) @if broken == 1 { " figure" } @else { " figures" } " out of limits" } }
+                @else { "Finished; " (out_of_limits(broken)) }
             }
             nav aria-label="Sections" {
                 a href="#model" { "Model" }
@@ -165,7 +172,11 @@ mod tests {
                 stage("tiles", Outcome::Failed("no disk".into())),
                 stage("quads", Outcome::Skipped("tiles failed".into())),
             ],
-            figures: vec![Figures { stage: "check".into(), value: json!({"original": {"genus": null}}) }],
+            figures: vec![Figures {
+                stage: "check".into(),
+                value: json!({"original": {"genus": null}}),
+                note: "measured for this page".into(),
+            }],
             ..Document::default()
         };
         let page = html(&document);
@@ -173,6 +184,7 @@ mod tests {
         assert!(!page.contains("<script>alert") && page.contains("&lt;script&gt;alert"));
         assert!(page.contains("known; the mesh is open") && page.contains("CAD surface: not in this report"));
         assert!(page.contains("There is no result with a shape to show."));
+        assert!(page.contains("measured for this page"));
     }
 
     #[test]

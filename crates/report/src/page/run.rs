@@ -39,7 +39,7 @@ pub(super) fn stages(document: &Document) -> Markup {
                             tr {
                                 th scope="row" { (stage.name) }
                                 td title=(stage.summary) { (stage.kind) }
-                                td { (outcome(stage)) @if !stage.reasons.is_empty() { span.message { " \u{2013} " (stage.reasons.join("; ")) } } }
+                                td { (outcome(stage)) @if stage.outcome == Outcome::Computed && !stage.reasons.is_empty() { span.message { " \u{2013} " (stage.reasons.join("; ")) } } }
                                 td.right { @if let Some(time) = stage.seconds { (duration(time)) } @else { "\u{2013}" } }
                                 td.bars {
                                     @if let Some(time) = stage.seconds {

@@ -199,8 +199,12 @@ impl Looked {
             }
             Features::Refused(why) => text.push(format!("not smoothed: {why}")),
         }
-        let kind = if self.beam_like() { "made of beams" } else { "bulky" };
-        text.push(format!("{kind}: it fills {:.0} % of its bounding box", 100.0 * self.filled));
+        let filled = format!("fills {:.1} % of its bounding box", 100.0 * self.filled);
+        let most = 100.0 * BEAM_LIKE;
+        text.push(match self.beam_like() {
+            true => format!("made of beams: it {filled}, less than {most:.0} %"),
+            false => format!("bulky, not made of beams: it {filled}, more than {most:.0} %"),
+        });
         text
     }
 }

@@ -8,6 +8,7 @@ mod pictures;
 mod results;
 mod scene;
 mod surface_mesh;
+mod unfinished;
 
 use crate::failure::Failure;
 use results::Results;
@@ -47,7 +48,9 @@ pub(crate) fn write_all(
             None => record.clone(),
         };
         let path = out.join(&export.file);
-        if write(&shown, cache, registry, &path)? {
+        // Who interrupts a run does not want to wait; `topipe report` measures what there is later.
+        let measure = record.code != ExitCode::Interrupted;
+        if write(&shown, cache, registry, &path, measure)? {
             written.push(PathBuf::from(&export.file));
         }
     }
@@ -64,18 +67,21 @@ fn part_of(record: &RunRecord, variant: &str, names: &[String]) -> RunRecord {
     part
 }
 
-/// Writes the report of a run, unless the file shows the same already. Says whether it was written.
+/// Writes the report of a run, unless the file shows the same already. Says whether it was written. With `measure` the
+/// figures of a validation that gave none are measured on what there is, which takes as long as the stage would.
 pub(crate) fn write(
     record: &RunRecord,
     cache: &Cache,
     registry: &Registry,
     path: &Path,
+    measure: bool,
 ) -> Result<bool, Failure> {
-    let key = key(record);
+    let measure = measure && unfinished::any(&record.stages);
+    let key = key(record, measure);
     if is_up_to_date(path, key) {
         return Ok(false);
     }
-    let page = topipe_report::html(&document(record, cache, registry));
+    let page = topipe_report::html(&document(record, cache, registry, measure));
     // A browser takes a comment before the doctype for none, so it stands behind it.
     let (doctype, rest) = page.split_once('>').unwrap_or((page.as_str(), ""));
     let seal = seal(key, page.len());
@@ -105,7 +111,7 @@ fn is_up_to_date(path: &Path, key: ContentHash) -> bool {
 }
 
 /// What the report shows, but for times and for what was cached.
-fn key(record: &RunRecord) -> ContentHash {
+fn key(record: &RunRecord, measure: bool) -> ContentHash {
     let mut text = format!("{} {} {}\n", env!("TOPIPE_WRITER_REPORT"), record.program, record.pipeline);
     for stage in &record.stages {
         let state = match &stage.outcome {
@@ -118,24 +124,34 @@ fn key(record: &RunRecord) -> ContentHash {
     for export in &record.exports {
         text += &format!("{} {:?}\n", export.file, export.hash);
     }
+    if measure {
+        text += "what there is was measured\n";
+    }
     ContentHash::of(text.as_bytes())
 }
 
+/// What is said of figures that no stage gave.
+const UNFINISHED: &str = "The validation gave no report in this run. These figures were measured for this page, on the results there are.";
+
 /// Everything the page shows.
-fn document(record: &RunRecord, cache: &Cache, registry: &Registry) -> Document {
-    let results = Results::load(record, cache, registry);
+fn document(record: &RunRecord, cache: &Cache, registry: &Registry, measure: bool) -> Document {
+    let mut results = Results::load(record, cache, registry);
+    if measure {
+        results.measure_unfinished();
+    }
     let (scene, histograms, left_out) = scene::scene(&results);
     let mut figures: Vec<Figures> = Vec::new();
-    for (stage, report) in results.reports() {
+    for (stage, report, own) in results.reports() {
         let value = serde_json::from_str(&report.to_json()).unwrap_or_default();
-        figures.push(Figures { stage: stage.to_owned(), value });
+        let note = if own { "" } else { UNFINISHED };
+        figures.push(Figures { stage: stage.to_owned(), value, note: note.to_owned() });
     }
     // A report that has taken over a comparison of stiffness tells of it already.
     let told = |figures: &[Figures]| figures.iter().any(|figures| figures.value.get("stiffness").is_some());
     for (stage, stiffness) in results.of::<crate::artifacts::Stiffness>() {
         if !told(&figures) {
             let value = serde_json::json!({ "stiffness": stiffness });
-            figures.push(Figures { stage: stage.stage.clone(), value });
+            figures.push(Figures { stage: stage.stage.clone(), value, note: String::new() });
         }
     }
     let machine = &record.machine;

@@ -1,5 +1,6 @@
 //! The results of a run, as far as the cache has them.
 
+use super::unfinished::{self, Measured};
 use crate::artifacts;
 use rayon::prelude::*;
 use topipe_engine::{ArtifactKind, Cache, Registry, RunRecord, StageRecord, Value};
@@ -10,6 +11,8 @@ use topipe_validation::Report;
 pub(super) struct Results<'a> {
     record: &'a RunRecord,
     values: Vec<Option<Value>>,
+    /// The figures of validations that gave none.
+    measured: Vec<Measured>,
     /// What is not there, one sentence each.
     pub(super) missing: Vec<String>,
 }
@@ -31,7 +34,24 @@ impl<'a> Results<'a> {
                 };
                 format!("The {} of stage {} {why}.", stage.artifact_kind, stage.stage)
             });
-        Self { missing: missing.collect(), record, values }
+        Self { missing: missing.collect(), measured: Vec::new(), record, values }
+    }
+
+    /// Measures what there is for validations that gave no report.
+    pub(super) fn measure_unfinished(&mut self) {
+        let measured: Vec<_> =
+            self.record.stages.iter().filter_map(|stage| unfinished::measure(stage, self)).collect();
+        for one in measured {
+            match one {
+                Ok(measured) => self.measured.push(measured),
+                Err(why) => self.missing.push(why),
+            }
+        }
+    }
+
+    /// The result at a port of a stage.
+    pub(super) fn input<K: ArtifactKind>(&self, stage: &StageRecord, port: &str) -> Option<&K::Value> {
+        self.value::<K>(self.stage(&stage.inputs.get(port)?.stage)?)
     }
 
     /// All results of one kind with their stages.
@@ -80,11 +100,10 @@ impl<'a> Results<'a> {
         stage.inputs.values().filter_map(|input| self.stage(&input.stage)).collect()
     }
 
-    /// The reports.
-    pub(super) fn reports(&self) -> Vec<(&str, &Report)> {
-        self.of::<artifacts::Report>()
-            .into_iter()
-            .map(|(stage, report)| (stage.stage.as_str(), report))
-            .collect()
+    /// The reports with their stages, and whether each is the stage's own or was measured for the page.
+    pub(super) fn reports(&self) -> Vec<(&str, &Report, bool)> {
+        let own = self.of::<artifacts::Report>().into_iter();
+        let own = own.map(|(stage, report)| (stage.stage.as_str(), report, true));
+        own.chain(self.measured.iter().map(|m| (m.stage.as_str(), &m.report, false))).collect()
     }
 }

@@ -4,7 +4,9 @@ use super::results::Results;
 use super::surface_mesh::{grid, surface_mesh};
 use crate::artifacts;
 use crate::fields::{distances, limit, vertex_areas};
-use std::collections::HashMap;
+use rayon::prelude::*;
+use std::collections::{HashMap, HashSet};
+use std::sync::OnceLock;
 use topipe_beams::Structure;
 use topipe_engine::StageRecord;
 use topipe_mesh::spatial::SurfaceIndex;
@@ -31,19 +33,56 @@ const SHOWN: f64 = 0.98;
 /// Pieces of the edge of a face that is a whole circle.
 const CIRCLE: f64 = 72.0;
 
-/// Layers are added in the order in which they are listed.
+/// The layers of one kind of result.
 struct Builder<'a> {
     results: &'a Results<'a>,
+    indices: &'a Indices,
+    room: &'a Room,
     scene: Scene,
     histograms: Vec<Histogram>,
-    /// Search structures by the stage of the mesh.
-    indices: HashMap<String, SurfaceIndex>,
-    /// What is not shown, one sentence each.
+}
+
+/// Search structures by the stage of the mesh, each built when it is first asked for.
+type Indices = HashMap<String, OnceLock<SurfaceIndex>>;
+
+/// Triangles of meshes, tiles and quadrilaterals that a page may hold: about 20 MB, and what a browser turns without a card
+/// of its own. (A CAD surface has never more than a few hundred thousand.)
+const MOST: usize = 1_500_000;
+
+/// Which results are shown, in their order, and what is said of the others.
+struct Room {
+    shown: HashSet<String>,
     left_out: Vec<String>,
 }
 
-/// Triangles of meshes that a page may hold: about 20 MB, and what a browser turns without a card of its own.
-const MOST: usize = 1_500_000;
+impl Room {
+    fn of(results: &Results<'_>) -> Self {
+        let meshes = results.of::<artifacts::Mesh>();
+        let meshes = meshes.into_iter().map(|(stage, part)| {
+            let name = if results.original(stage).is_some() { "Smoothed mesh" } else { "Original mesh" };
+            (name, stage, part.mesh.face_count())
+        });
+        let tilings = results.of::<artifacts::Tiling>();
+        let tilings =
+            tilings.into_iter().map(|(stage, tiling)| ("Tiles", stage, tiling.part.mesh.face_count()));
+        let layouts = results.of::<artifacts::QuadLayout>();
+        let layouts = layouts
+            .into_iter()
+            .map(|(stage, layout)| ("Quadrilaterals", stage, layout.part.mesh.face_count()));
+        let mut room = Self { shown: HashSet::new(), left_out: Vec::new() };
+        let mut triangles = 0;
+        for (name, stage, count) in meshes.chain(tilings).chain(layouts) {
+            if triangles + count <= MOST {
+                triangles += count;
+                room.shown.insert(stage.stage.clone());
+            } else {
+                let more = "too many to be shown here as well";
+                room.left_out.push(format!("{name} of stage {}: {count} triangles are {more}.", stage.stage));
+            }
+        }
+        room
+    }
+}
 
 /// All layers, and the distributions of what is measured on them.
 pub(super) fn scene(results: &Results<'_>) -> (Scene, Vec<Histogram>, Vec<String>) {
@@ -52,17 +91,27 @@ pub(super) fn scene(results: &Results<'_>) -> (Scene, Vec<Histogram>, Vec<String
         sequential: stops(&palette::sequential),
         diverging: stops(&|t| palette::diverging(2.0 * t - 1.0)),
     };
-    let scene = Scene { color_maps, ..Scene::default() };
-    let mut builder =
-        Builder { results, scene, histograms: Vec::new(), indices: HashMap::new(), left_out: Vec::new() };
-    builder.surfaces();
-    builder.meshes();
-    builder.tilings();
-    builder.layouts();
-    builder.skeletons();
-    builder.beams();
-    builder.report_histograms();
-    (builder.scene, builder.histograms, builder.left_out)
+    let mut scene = Scene { color_maps, ..Scene::default() };
+    let meshes = results.of::<artifacts::Mesh>();
+    let indices: Indices = meshes.iter().map(|(stage, _)| (stage.stage.clone(), OnceLock::new())).collect();
+    let room = Room::of(results);
+    let built: Vec<Builder<'_>> = (Builder::KINDS.into_par_iter().with_max_len(1))
+        .map(|layers| {
+            let (scene, histograms) = (Scene::default(), Vec::new());
+            let mut builder = Builder { results, indices: &indices, room: &room, scene, histograms };
+            layers(&mut builder);
+            builder
+        })
+        .collect();
+    let mut histograms = Vec::new();
+    for mut builder in built {
+        scene.surfaces.append(&mut builder.scene.surfaces);
+        scene.lines.append(&mut builder.scene.lines);
+        scene.points.append(&mut builder.scene.points);
+        scene.labels.append(&mut builder.scene.labels);
+        histograms.append(&mut builder.histograms);
+    }
+    (scene, histograms, room.left_out)
 }
 
 /// The first layer of its kind has the plain name, further ones that of their stage too.
@@ -119,22 +168,24 @@ impl Chains {
 }
 
 impl<'a> Builder<'a> {
+    /// What adds layers, in the order in which they are listed.
+    const KINDS: [fn(&mut Self); 7] = [
+        Self::surfaces,
+        Self::meshes,
+        Self::tilings,
+        Self::layouts,
+        Self::skeletons,
+        Self::beams,
+        Self::report_histograms,
+    ];
+
     /// The distances of points from the mesh of a stage.
-    fn distances(&mut self, points: &[DVec3], stage: &StageRecord, part: &Part) -> Vec<f64> {
-        let index =
-            self.indices.entry(stage.stage.clone()).or_insert_with(|| SurfaceIndex::build(&part.mesh));
-        distances(points, index)
+    fn distances(&self, points: &[DVec3], stage: &StageRecord, part: &Part) -> Vec<f64> {
+        distances(points, self.index(stage, part))
     }
 
-    /// Whether there is room for a mesh; says so where there is none.
-    fn has_room(&mut self, name: &str, stage: &str, triangles: usize) -> bool {
-        let shown: usize = self.scene.surfaces.iter().map(|surface| surface.mesh.face_count()).sum();
-        let fits = shown + triangles <= MOST;
-        if !fits {
-            let more = "too many to be shown here as well";
-            self.left_out.push(format!("{name} of stage {stage}: {triangles} triangles are {more}."));
-        }
-        fits
+    fn index(&self, stage: &StageRecord, part: &Part) -> &'a SurfaceIndex {
+        self.indices[&stage.stage].get_or_init(|| SurfaceIndex::build(&part.mesh))
     }
 
     fn histogram(&mut self, title: &str, about: &str, unit: &str, values: &[f64], weights: &[f64]) {
@@ -194,7 +245,7 @@ impl<'a> Builder<'a> {
             let count = if before.is_some() { smoothed } else { 0 };
             originals += usize::from(before.is_none());
             smoothed += usize::from(before.is_some());
-            if !self.has_room(&name, &stage.stage, part.mesh.face_count()) {
+            if !self.room.shown.contains(&stage.stage) {
                 continue;
             }
             let mut layer = Surface::new(&id, &name, part.mesh.clone());
@@ -249,7 +300,7 @@ impl<'a> Builder<'a> {
     fn tilings(&mut self) {
         for (count, (stage, tiling)) in self.results.of::<artifacts::Tiling>().into_iter().enumerate() {
             let (id, name) = named(count, "tiles", "Tiles", &stage.stage);
-            if !self.has_room("Tiles", &stage.stage, tiling.part.mesh.face_count()) {
+            if !self.room.shown.contains(&stage.stage) {
                 continue;
             }
             self.scene.surfaces.push(tiles(tiling, &id, &name));
@@ -259,7 +310,7 @@ impl<'a> Builder<'a> {
     fn layouts(&mut self) {
         for (count, (stage, layout)) in self.results.of::<artifacts::QuadLayout>().into_iter().enumerate() {
             let mesh = &layout.part.mesh;
-            if !self.has_room("Quadrilaterals", &stage.stage, mesh.face_count()) {
+            if !self.room.shown.contains(&stage.stage) {
                 continue;
             }
             let (id, name) = named(count, "quads", "Quadrilaterals", &stage.stage);
@@ -292,10 +343,7 @@ impl<'a> Builder<'a> {
         for (count, (stage, skeleton)) in results.of::<artifacts::Skeleton>().into_iter().enumerate() {
             let mut values = vec![0.0; skeleton.points.len()];
             if let Some((mesh_stage, part)) = results.mesh_before(stage) {
-                let index = self
-                    .indices
-                    .entry(mesh_stage.stage.clone())
-                    .or_insert_with(|| SurfaceIndex::build(&part.mesh));
+                let index = self.index(mesh_stage, part);
                 let off = topipe_validation::off_center_of_points(skeleton, part, index);
                 for &(point, value) in &off {
                     values[point] = value;
@@ -349,7 +397,7 @@ impl<'a> Builder<'a> {
 
     /// What is in the report as counts.
     fn report_histograms(&mut self) {
-        for (_, report) in self.results.reports() {
+        for (_, report, _) in self.results.reports() {
             let Some(shape) = report.smoothing.as_ref().and_then(|smoothing| smoothing.shape.as_ref()) else {
                 continue;
             };
