@@ -10,7 +10,7 @@
 //! Each value is computed from the same values in the same order as pass after pass: the bits are the same.
 
 use crate::kernel::{Change, Domain, View};
-use crate::methods::{Stencil, sweep};
+use crate::methods::{Pass, Stencil, sweep};
 use rayon::prelude::*;
 use topipe_mesh::DVec3;
 
@@ -143,15 +143,9 @@ impl<S: Stencil> Journey<'_, S> {
             let (from, to) = (bounds[block], bounds[block + 1]);
             let view = View { values: read, first };
             let stage = pass % S::PASSES;
-            let change = sweep(
-                self.stencil,
-                stage,
-                self.domain,
-                self.original,
-                view,
-                from,
-                &mut write[from - first..to - first],
-            );
+            let window =
+                Pass { domain: self.domain, original: self.original, read: view, from, before: None };
+            let change = sweep(self.stencil, stage, &window, &mut write[from - first..to - first]);
             (stage + 1 == S::PASSES).then_some((pass / S::PASSES, change))
         })
     }
@@ -195,8 +189,8 @@ mod tests {
         let (mut read, mut write) = (original.to_vec(), vec![DVec3::ZERO; original.len()]);
         let mut squares = 0.0;
         for pass in 0..passes {
-            let change =
-                sweep(stencil, pass % S::PASSES, domain, original, View::whole(&read), 0, &mut write);
+            let whole = Pass { domain, original, read: View::whole(&read), from: 0, before: None };
+            let change = sweep(stencil, pass % S::PASSES, &whole, &mut write);
             squares += change.squares;
             std::mem::swap(&mut read, &mut write);
         }

@@ -144,19 +144,20 @@ impl<'a> View<'a> {
             y += p.y;
             z += p.z;
         };
-        if let &[a, b, c, d, e, f] = row {
-            // Six neighbours are the rule, and take a third less time without a loop.
+        // One division for three coordinates, and none where the number of neighbours is the usual one.
+        let share = if let &[a, b, c, d, e, f] = row {
+            // Without a loop six neighbours take a third less time.
             add(a);
             add(b);
             add(c);
             add(d);
             add(e);
             add(f);
+            const { 1.0 / 6.0 }
         } else {
             row.iter().for_each(|&j| add(j));
-        }
-        // One division for three coordinates.
-        let share = (row.len() as f64).recip();
+            (row.len() as f64).recip()
+        };
         DVec3::new(x * share, y * share, z * share)
     }
 }

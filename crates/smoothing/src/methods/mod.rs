@@ -80,46 +80,52 @@ impl Site<'_> {
     }
 }
 
-/// One pass over the vertices from `from` on whose values are `write`; returns how far they moved, if the pass is the last of an
-/// iteration.
-pub(crate) fn sweep<S: Stencil>(
-    stencil: &S,
-    stage: usize,
-    domain: &Domain,
-    original: &[DVec3],
-    read: View<'_>,
-    from: usize,
-    write: &mut [DVec3],
-) -> Change {
+/// What a pass works on: the vertices from `from` on.
+pub(crate) struct Pass<'a> {
+    pub(crate) domain: &'a Domain,
+    /// Positions before the first iteration.
+    pub(crate) original: &'a [DVec3],
+    /// What the pass before wrote.
+    pub(crate) read: View<'a>,
+    pub(crate) from: usize,
+    /// In the second of two passes the positions before the iteration, where they are not in what is written.
+    pub(crate) before: Option<&'a [DVec3]>,
+}
+
+/// One pass over the vertices whose values are `write`; returns how far they moved, if the pass is the last of an iteration.
+pub(crate) fn sweep<S: Stencil>(stencil: &S, stage: usize, pass: &Pass<'_>, write: &mut [DVec3]) -> Change {
     // A loop for each stage: what the other one reads is not looked at.
-    match stage {
-        0 => sweep_stage::<S, 0>(stencil, domain, original, read, from, write),
-        _ => sweep_stage::<S, 1>(stencil, domain, original, read, from, write),
+    match (stage, pass.before) {
+        (0, _) => sweep_stage::<S, 0, false>(stencil, pass, &[], write),
+        (_, None) => sweep_stage::<S, 1, false>(stencil, pass, &[], write),
+        (_, Some(before)) => sweep_stage::<S, 1, true>(stencil, pass, &before[pass.from..], write),
     }
 }
 
 /// Vertices between two sums of steps.
 const STRIP: usize = 64;
 
-fn sweep_stage<S: Stencil, const STAGE: usize>(
+fn sweep_stage<S: Stencil, const STAGE: usize, const APART: bool>(
     stencil: &S,
-    domain: &Domain,
-    original: &[DVec3],
-    read: View<'_>,
-    from: usize,
+    pass: &Pass<'_>,
+    before: &[DVec3],
     write: &mut [DVec3],
 ) -> Change {
+    let Pass { domain, original, read, from, .. } = *pass;
     let last = STAGE + 1 == S::PASSES;
     let mut change = Change::default();
     let mut begin = domain.start[from] as usize;
+    let mut squares = [0.0; STRIP];
     for (strip, write) in write.chunks_mut(STRIP).enumerate() {
         let from = from + strip * STRIP;
         let (ends, original) = (&domain.start[from + 1..], &original[from..]);
         let here = &read.values[from - read.first..];
-        let mut squares = [0.0; STRIP];
+        let before = if APART { &before[strip * STRIP..] } else { before };
+        squares[write.len()..].fill(0.0);
         for (i, slot) in write.iter_mut().enumerate() {
             let end = ends[i] as usize;
-            let (here, before) = (here[i], *slot);
+            let here = here[i];
+            let before = if APART { before[i] } else { *slot };
             let after = if begin < end {
                 let row = &domain.neighbors[begin..end];
                 let site = Site { row, first: begin, read, here, before, original: &original[i] };
@@ -175,11 +181,13 @@ impl<S: Stencil> Step for Stepper<S> {
         self.stencil.prepare(domain, current);
         let stencil = &self.stencil;
         let pass = |stage, read: &[DVec3], write: &mut [DVec3], before: Option<&[DVec3]>| {
-            Change::sum(&in_chunks_mut(write, |base, chunk| {
-                if let Some(before) = before {
-                    chunk.copy_from_slice(&before[base..base + chunk.len()]);
-                }
-                sweep(stencil, stage, domain, original, View::whole(read), base, chunk)
+            Change::sum(&in_chunks_mut(write, |from, chunk| {
+                sweep(
+                    stencil,
+                    stage,
+                    &Pass { domain, original, read: View::whole(read), from, before },
+                    chunk,
+                )
             }))
         };
         if S::PASSES == 1 {
