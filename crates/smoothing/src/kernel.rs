@@ -241,10 +241,11 @@ impl Change {
         self.distances += square.sqrt();
     }
 
-    /// Adds steps by the squares of their lengths. Roots in single precision, which a processor takes four at a time: in double precision
-    /// they took a third of the time of an iteration.
+    /// Adds steps by their coordinates. Roots in single precision, which a processor takes four at a time: in double precision they took a third of
+    /// the time of an iteration.
     #[inline]
-    pub(crate) fn add_squares<const N: usize>(&mut self, squares: &[f64; N]) {
+    pub(crate) fn add_steps<const N: usize>(&mut self, [x, y, z]: &[[f64; N]; 3]) {
+        let squares: [f64; N] = std::array::from_fn(|i| x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
         let mut roots = squares.map(|s| s as f32);
         roots.iter_mut().for_each(|r| *r = r.sqrt());
         let (mut sum, mut total) = ([0.0; 4], [0.0; 4]);

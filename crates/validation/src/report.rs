@@ -134,6 +134,9 @@ pub struct DihedralFigures {
     pub folded_faces: usize,
     /// Those of them of which, and of whose neighbours, no vertex may move: no smoothing can unfold them.
     pub folded_held: usize,
+    /// Those of them of which, and of whose neighbours, each vertex is held or slides on a region, and not all are held: to unfold them
+    /// the outline of a region has to give way.
+    pub folded_sliding: usize,
 }
 
 /// Angle between the normals across edges where moved faces meet faces that did not move.

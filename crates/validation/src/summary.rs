@@ -113,9 +113,14 @@ impl Report {
                     "           largest dihedral angle {before} -> {:.1} degrees, {} folded faces{}, {} self-intersections",
                     shape.after.max_deg,
                     shape.after.folded_faces,
-                    match shape.after.folded_held {
-                        0 => String::new(),
-                        held => format!(" ({held} among held vertices alone)"),
+                    match (shape.after.folded_held, shape.after.folded_sliding) {
+                        (0, 0) => String::new(),
+                        (held, 0) => format!(" ({held} among held vertices alone)"),
+                        (0, sliding) =>
+                            format!(" ({sliding} among vertices that are held or slide on a face)"),
+                        (held, sliding) => format!(
+                            " ({held} among held vertices alone, {sliding} among such and vertices that slide on a face)"
+                        ),
                     },
                     shape.self_intersections
                 )?;

@@ -615,4 +615,18 @@ fn folds_among_held_vertices_are_told_apart() {
     part.frozen[0] = false;
     let (again, held) = folds(&part);
     assert!(again == all && held < all, "{held} of {again}");
+    // The same vertex on the outline of a face slides.
+    let sliding = |part: &Part| {
+        let inputs = Inputs { mesh: Some(part), ..Inputs::of(&original) };
+        report(&inputs).smoothing.unwrap().shape.unwrap().after.folded_sliding
+    };
+    assert_eq!(sliding(&part), 0);
+    part.regions.push(Region {
+        shape: RegionShape::Plane { point: DVec3::ZERO, normal: DVec3::Z },
+        area: 1.0,
+        residual: 0.0,
+    });
+    let own = part.mesh.triangles.iter().position(|t| t[0].0 == 0 || t[1].0 == 0 || t[2].0 == 0).unwrap();
+    part.region_of_face[own] = RegionId(0);
+    assert_eq!(sliding(&part), all - held);
 }

@@ -56,6 +56,18 @@ pub(super) const KNOWN: &[Figure] = &[
         "",
         No,
     ),
+    figure(
+        "smoothing.shape.before.folded_sliding",
+        "Those of them with vertices that are held or slide on a face, also in their neighbours",
+        "",
+        No,
+    ),
+    figure(
+        "smoothing.shape.after.folded_sliding",
+        "Those of them with vertices that are held or slide on a face: to unfold them its outline has to give way",
+        "",
+        No,
+    ),
     figure("smoothing.shape.kink_before.edges", "Edges between held and moved triangles", "", No),
     figure("smoothing.shape.kink_before.median_deg", "Half of them were less sharp before than", "", No),
     figure("smoothing.shape.kink_before.p90_deg", "Nine in ten were less sharp before than", "", No),

@@ -70,14 +70,20 @@ pub(super) fn judge(report: &Value, value: &Value, limit: &Limit, unit: &str) ->
             false => (None, State::Free),
         },
         Limit::Folds => {
-            let held =
-                lookup(report, "smoothing.shape.after.folded_held").and_then(Value::as_u64).unwrap_or(0);
-            let words = if held == 0 {
-                "none".into()
-            } else {
-                format!("none but the {held} with held vertices alone")
+            let count = |key: &str| {
+                let path = format!("smoothing.shape.after.{key}");
+                lookup(report, &path).and_then(Value::as_u64).unwrap_or(0)
             };
-            (Some(words), state(value.as_u64().map(|folds| folds <= held)))
+            let (held, sliding) = (count("folded_held"), count("folded_sliding"));
+            let words = match (held, sliding) {
+                (0, 0) => "none".into(),
+                (held, 0) => format!("none but the {held} with held vertices alone"),
+                (0, sliding) => format!("none but the {sliding} whose vertices are held or slide on a face"),
+                (held, sliding) => format!(
+                    "none but the {held} with held vertices alone and the {sliding} whose vertices are held or slide on a face"
+                ),
+            };
+            (Some(words), state(value.as_u64().map(|folds| folds <= held + sliding)))
         }
         Limit::Loops => {
             let count = |path| lookup(report, path).and_then(Value::as_i64);

@@ -49,8 +49,10 @@ impl Walk<'_> {
         let (name, unit) = unit(key);
         // `normal_jump_deg: {max, mean}` has its unit one level up.
         let above = path.rsplit('.').nth(1).unwrap_or_default();
-        let counts =
-            matches!(key, "edges" | "points" | "singular" | "histogram" | "folded_faces" | "folded_held");
+        let counts = matches!(
+            key,
+            "edges" | "points" | "singular" | "histogram" | "folded_faces" | "folded_held" | "folded_sliding"
+        );
         let unit = match (unit, super::words::unit(above).1) {
             ("", outer @ "\u{b0}") if !counts => outer,
             _ => unit,

@@ -4,7 +4,9 @@
 //! point against the mean of its neighbours all the same. On the nine reference parts 17 such faces were left, now 3, all between
 //! frozen vertices and outlines of flat faces: on bell-crank the face and its neighbours have frozen vertices alone; on bridge two corners
 //! could slide in their plane, but within one edge length that leaves an edge sharper than any there before (142 and 137 degrees instead
-//! of 125 and 130, by random search over both corners), and without one they would have to go 1.9 and 1.3 edge lengths. The vertices of the face
+//! of 125 and 130, by random search over both corners), and without one they would have to go 1.9 and 1.3 edge lengths. Flipping the edge between such a
+//! face and the flat face beside it would take both folds, but cut a triangle of the flat face out of its plane and leave edges of 130 and 129
+//! degrees; the other two edges of each can not be flipped, as the new edge exists already. The report tells such folds apart. The vertices of the face
 //! and the tips of its neighbours are searched for better places, as for spikes, with limits that fall until the fold is gone. Where that
 //! does not do, because several faces are folded into each other, the free vertices around become a membrane on what is
 //! held around them.

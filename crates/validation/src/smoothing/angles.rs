@@ -11,11 +11,11 @@ const FOLDED: f64 = -0.5;
 pub(super) fn figures(original: &Part, part: &Part) -> Option<ShapeFigures> {
     let connectivity = Connectivity::build(&part.mesh).ok()?;
     let same_triangles = original.mesh.triangles == part.mesh.triangles;
-    let before = same_triangles.then(|| dihedral(&original.mesh, &part.frozen, &connectivity));
+    let before = same_triangles.then(|| dihedral(&original.mesh, part, &connectivity));
     let kink_before = same_triangles.then(|| kink(part, &original.mesh, &connectivity)).flatten();
     Some(ShapeFigures {
         before,
-        after: dihedral(&part.mesh, &part.frozen, &connectivity),
+        after: dihedral(&part.mesh, part, &connectivity),
         kink_before,
         kink_after: kink(part, &part.mesh, &connectivity),
         self_intersections: crossings(&part.mesh).len(),
@@ -36,10 +36,25 @@ fn angles<'a>(
     })
 }
 
-fn dihedral(mesh: &TriangleMesh, frozen: &[bool], connectivity: &Connectivity) -> DihedralFigures {
+/// `part` says which vertices of `mesh` are held.
+fn dihedral(mesh: &TriangleMesh, part: &Part, connectivity: &Connectivity) -> DihedralFigures {
     let normals: Vec<DVec3> = mesh.faces().map(|f| mesh.normal(f)).collect();
-    let mut figures = DihedralFigures { max_deg: 0.0, histogram: [0; 18], folded_faces: 0, folded_held: 0 };
-    let still = |f: FaceId| mesh.triangles[f.index()].iter().all(|v| frozen[v.index()]);
+    let mut figures = DihedralFigures {
+        max_deg: 0.0,
+        histogram: [0; 18],
+        folded_faces: 0,
+        folded_held: 0,
+        folded_sliding: 0,
+    };
+    let still = |f: FaceId| mesh.triangles[f.index()].iter().all(|v| part.frozen[v.index()]);
+    // What is on a region and not held slides on it.
+    let mut bound = part.frozen.clone();
+    for (t, region) in mesh.triangles.iter().zip(&part.region_of_face) {
+        if region.is_some() {
+            t.iter().for_each(|v| bound[v.index()] = true);
+        }
+    }
+    let is_bound = |f: FaceId| mesh.triangles[f.index()].iter().all(|v| bound[v.index()]);
     for (_, _, angle) in angles(&normals, connectivity).filter(|a| a.2.is_finite()) {
         figures.max_deg = figures.max_deg.max(angle);
         figures.histogram[((angle / 10.0) as usize).min(17)] += 1;
@@ -49,7 +64,11 @@ fn dihedral(mesh: &TriangleMesh, frozen: &[bool], connectivity: &Connectivity) -
         let around: DVec3 = neighbors().map(|g| normals[g.index()]).sum();
         if normals[f.index()].dot(around.normalize_or_zero()) < FOLDED {
             figures.folded_faces += 1;
-            figures.folded_held += usize::from(still(f) && neighbors().all(still));
+            if still(f) && neighbors().all(still) {
+                figures.folded_held += 1;
+            } else if is_bound(f) && neighbors().all(is_bound) {
+                figures.folded_sliding += 1;
+            }
         }
     }
     figures
