@@ -30,8 +30,10 @@ threads case="bracket":
     done
     cmp target/threads/1.txt target/threads/2.txt && cmp target/threads/1.txt target/threads/8.txt
 
-# Draw the pictures of the README, of pipelines/README.md and of the guide anew.
-pictures: gallery
+# Draw the pictures of the README, of pipelines/README.md and of the guide anew. The one of the report needs the packages of
+# tests/clients and Chromium.
+pictures python="target/clients/bin/python": gallery
+    {{python}} tests/clients/check_report.py topipe-out/bracket/report.html --picture docs/src/pictures/report.png
     for stage in mesh smooth tiles quads surface; do \
         target/release/topipe -q render $stage --pipeline pipelines/bracket.toml \
             -o docs/src/pictures/$stage.png --size 720x540 || exit 1; \

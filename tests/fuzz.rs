@@ -254,6 +254,51 @@ fn stl() {
     mesh("stl", "stl", vec![binary, text.into_bytes()]);
 }
 
+const CUBES: &str = "0 0 0 1 0 0 2 0 0 0 1 0 1 1 0 2 1 0 0 0 1 1 0 1 2 0 1 0 1 1 1 1 1 2 1 1";
+
+#[test]
+fn vtk() {
+    let start = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET";
+    let grid = format!(
+        "{start} UNSTRUCTURED_GRID\nPOINTS 12 float\n{CUBES}\nCELLS 2 18\n8 0 1 4 3 6 7 10 9\n8 1 2 5 4 7 8 11 10\n\
+         CELL_TYPES 2\n12 12\nCELL_DATA 2\nSCALARS density float 1\nLOOKUP_TABLE default\n1 0\nVECTORS u float\n1 2 3 4 5 6\n"
+    );
+    let new = grid.replace(
+        "CELLS 2 18\n8 0 1 4 3 6 7 10 9\n8 1 2 5 4 7 8 11 10\n",
+        "CELLS 3 16\nOFFSETS vtktypeint64\n0 8 16\nCONNECTIVITY vtktypeint64\n0 1 4 3 6 7 10 9 1 2 5 4 7 8 11 10\n",
+    );
+    let points = format!(
+        "{start} STRUCTURED_POINTS\nDIMENSIONS 3 3 3\nORIGIN 0 0 0\nSPACING 1 1 1\nPOINT_DATA 27\nFIELD f 1\nrho 1 27 double\n{}1\n",
+        "0 0.2 1 ".repeat(9)
+    );
+    let surface = format!(
+        "{start} POLYDATA\nPOINTS 4 double\n0 0 0 1 0 0 0 1 0 0 0 1\nPOLYGONS 4 16\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+    );
+    let binary = [
+        b"# vtk DataFile Version 3.0\nx\nBINARY\nDATASET POLYDATA\nPOINTS 4 char\n".to_vec(),
+        vec![0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1],
+        b"\nPOLYGONS 4 16\n".to_vec(),
+        [3, 0, 2, 1, 3, 0, 1, 3, 3, 1, 2, 3, 3, 2, 0, 3].iter().flat_map(|k: &i32| k.to_be_bytes()).collect(),
+    ]
+    .concat();
+    let texts = [grid, new, points, surface].map(String::into_bytes);
+    mesh("vtk", "vtk", texts.into_iter().chain([binary]).collect());
+}
+
+#[test]
+fn inp() {
+    let mut deck = "*HEADING\nx\n*NODE\n".to_owned();
+    let numbers: Vec<&str> = CUBES.split(' ').collect();
+    for (k, p) in numbers.chunks(3).enumerate() {
+        deck += &format!("{}, {}, {}, {}\n", k + 1, p[0], p[1], p[2]);
+    }
+    deck += "*ELEMENT, TYPE=C3D8, ELSET=EALL\n1, 1, 2, 5, 4, 7, 8, 11, 10\n2, 2, 3, 6, 5, 8, 9,\n12, 11\n\
+             *ELSET, ELSET=A, GENERATE\n1, 2, 1\n*ELSET, ELSET=NON_DESIGN\nA, 1\n";
+    let shells =
+        "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=S3\n1,1,3,2\n2,1,2,4\n3,2,3,4\n4,3,1,4\n";
+    mesh("inp", "inp", vec![deck.into_bytes(), shells.as_bytes().to_vec()]);
+}
+
 fn text_mesh(header: &str, face: &str, from: u32) -> Vec<u8> {
     let (points, faces) = tetrahedron();
     let mut text = header.to_owned();

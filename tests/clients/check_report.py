@@ -1,6 +1,9 @@
 """Opens a report.html in headless Chromium, as someone would who was mailed it, and prints what was found as JSON.
 
     python check_report.py report.html [--screenshots FOLDER]
+    python check_report.py report.html --picture report.png
+
+The second form takes one picture of what is seen first, for the README.
 
 The browser is that of CHROMIUM, or `chromium`, or `google-chrome`; it draws in software. Looked at: messages of the
 console, requests, pixels of the model, layers, section plane, keyboard, names of the controls, and the contrast of texts.
@@ -77,11 +80,19 @@ def main():
     parser.add_argument("report", type=Path)
     parser.add_argument("--screenshots", type=Path)
     parser.add_argument("--flag", action="append", default=[], help="one more for Chromium, as --flag=--disable-gpu-compositing")
+    parser.add_argument("--picture", type=Path, help="take one picture of the top of the page, and nothing else")
     arguments = parser.parse_args()
     found = {"messages": [], "requests": [], "screenshots": {}}
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_path(), args=FLAGS + arguments.flag)
+        if arguments.picture:
+            page = browser.new_page(viewport={"width": 1280, "height": 1190})
+            page.goto(arguments.report.resolve().as_uri())
+            page.wait_for_selector("html[data-viewer=ready]", state="attached", timeout=60000)
+            page.screenshot(path=arguments.picture)
+            browser.close()
+            return
         found["browser"] = browser.version
         page = browser.new_page(viewport={"width": 960, "height": 640})
         page.on("console", lambda m: found["messages"].append(f"{m.type}: {m.text}"))

@@ -97,7 +97,7 @@ const LARGEST: &[(&str, &str)] = &[
     ("spike-through-side.off", "spike-through-side.off: the surface passes through itself in 5 place(s), the first at (0.3, 0.3, 0) between faces 0 and 2; unite the bodies in the program that made the mesh, or set allow_self_intersection"),
     ("t-junction.off", "t-junction.off: the surface is not closed: it has 1 border; the longest, 3 edges and 2.0000 long, passes (0.5, 0, 0) beside face 4; close the holes in the program that made the mesh; nothing is missing there, but its two sides do not share their vertices; where these nearly coincide, weld_tolerance helps"),
     ("tetrahedron.ply", "PLY (ASCII): 4 vertices, 4 faces, genus 0, 1 shell(s), volume 0.166667"),
-    ("text.stl", "text.stl: this is not a mesh that can be read; STL, OFF, OBJ, PLY, VTU and VTI can"),
+    ("text.stl", "text.stl: this is not a mesh that can be read; STL, OFF, OBJ, PLY, VTU, VTI, VTK and INP can"),
     ("touching-pillars.off", "OFF: 37 vertices, 74 faces, genus 1, 1 shell(s), volume 10.000000; 44 welded vertices with equal coordinates; 48 dropped internal faces (two back to back); 1 took apart edges with more than two faces; 1 divided edges along which the surface touches itself"),
     ("trailing-bytes.stl", "STL (binary): 8 vertices, 12 faces, genus 0, 1 shell(s), volume 1.000000; 4 ignored bytes after the last face"),
     ("trailing-text.stl", "STL (ASCII): 8 vertices, 12 faces, genus 0, 1 shell(s), volume 1.000000; 1 ignored lines after the end of the solid"),

@@ -462,7 +462,7 @@ pub struct ManArguments {
 /// `topipe new`.
 #[derive(Debug, Args)]
 pub struct NewArguments {
-    /// The mesh: STL, OFF, OBJ or PLY, or a density field: VTU or VTI.
+    /// The mesh: STL, OFF, OBJ or PLY, a density field: VTU, VTI or VTK, or a deck: INP.
     pub mesh: PathBuf,
     /// The pipeline to write [default: the mesh's name with .toml, in this folder].
     #[arg(short, long, value_name = "FILE")]

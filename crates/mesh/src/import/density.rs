@@ -1,4 +1,5 @@
-//! The surface of a density field: of the kept cells of a grid (VTU), or where an image has a value (VTI).
+//! The surface of a density field: of the kept cells of a grid (VTU, legacy VTK, element sets), or where an image has a value
+//! (VTI, legacy VTK).
 
 use super::soup::Soup;
 use super::vtk::VtkFile;
@@ -28,12 +29,19 @@ pub(super) fn parse(file: &str, bytes: &[u8], options: &ImportOptions) -> Result
     }
 }
 
-fn wrong(file: &str, place: &str, problem: &str) -> ImportError {
+pub(super) fn wrong(file: &str, place: &str, problem: &str) -> ImportError {
     ImportError::Malformed { file: file.to_owned(), place: place.to_owned(), problem: problem.to_owned() }
 }
 
+/// Names of fields in a message.
+const MOST_NAMES: usize = 8;
+
 /// The field that is meant: the one named, else `density`, else the only one.
-fn choose<'a>(file: &str, names: &[&'a str], options: &ImportOptions) -> Result<&'a str, ImportError> {
+pub(super) fn choose<'a>(
+    file: &str,
+    names: &[&'a str],
+    options: &ImportOptions,
+) -> Result<&'a str, ImportError> {
     let named = |name: &str| names.iter().copied().find(|n| n.eq_ignore_ascii_case(name));
     match (&options.field, names) {
         (Some(field), _) => named(field),
@@ -41,11 +49,16 @@ fn choose<'a>(file: &str, names: &[&'a str], options: &ImportOptions) -> Result<
         (None, _) => named("density"),
     }
     .ok_or_else(|| {
-        let problem = format!(
-            "the file has the fields {}; say with `field` which one is the density",
-            names.join(", ")
-        );
-        wrong(file, "DataArray", &problem)
+        // A field for each iteration makes a long list.
+        let mut list = names.iter().take(MOST_NAMES).copied().collect::<Vec<_>>().join(", ");
+        if let Some(last) = names.get(MOST_NAMES..).and_then(<[_]>::last) {
+            list += &format!(" and {} more, the last of them {last}", names.len() - MOST_NAMES);
+        }
+        let problem = match names {
+            [] => "the file has no field of single numbers".to_owned(),
+            _ => format!("the file has the fields {list}; say with `field` which one is the density"),
+        };
+        wrong(file, "fields", &problem)
     })
 }
 
@@ -75,6 +88,23 @@ fn faces_of(kind: u8) -> Option<(usize, &'static [&'static [usize]])> {
     }
 }
 
+/// The cells of a grid, some of which are kept.
+#[derive(Debug, Default)]
+pub(super) struct Cells {
+    /// Name of the format for people.
+    pub(super) format: &'static str,
+    pub(super) positions: Vec<DVec3>,
+    /// What each cell is, as VTK counts kinds.
+    pub(super) kinds: Vec<u8>,
+    /// The points of all cells, one after the other, and where each ends. What is beyond the points is found out later.
+    pub(super) corners: Vec<u32>,
+    pub(super) ends: Vec<usize>,
+    /// Name of the field that says which are kept, and its value for each cell; without one all are.
+    pub(super) field: Option<(String, Vec<f64>)>,
+    /// Cells that are kept whatever the field says, as non-design.
+    pub(super) passive: Option<Vec<bool>>,
+}
+
 fn cells(file: &str, vtk: &VtkFile<'_>, options: &ImportOptions) -> Result<Soup, ImportError> {
     let points = whole(file, vtk, "Piece", "NumberOfPoints")?;
     let count = whole(file, vtk, "Piece", "NumberOfCells")?;
@@ -84,58 +114,77 @@ fn cells(file: &str, vtk: &VtkFile<'_>, options: &ImportOptions) -> Result<Soup,
     let corners = vtk.array("Cells", Some("connectivity"), count.saturating_mul(27))?;
     let names = vtk.scalars("CellData");
     // A mesh of solid cells and nothing else is a part as it is.
-    let (field, density) = if names.is_empty() && options.field.is_none() {
-        (
-            "",
-            vec![if options.inside == Inside::Above { f64::INFINITY } else { f64::NEG_INFINITY }; ends.len()],
-        )
+    let field = if names.is_empty() && options.field.is_none() {
+        None
     } else {
         let field = choose(file, &names, options)?;
-        (field, vtk.array("CellData", Some(field), count)?)
+        Some((field.to_owned(), vtk.array("CellData", Some(field), count)?))
     };
-    if positions.len() != points.saturating_mul(3) || [kinds.len(), ends.len(), density.len()] != [count; 3] {
-        return Err(wrong(
-            file,
-            "DataArray",
-            "an array has not as many numbers as there are points or cells",
-        ));
+    if positions.len() != points.saturating_mul(3) || [kinds.len(), ends.len()] != [count; 2] {
+        return Err(wrong(file, "DataArray", UNEQUAL));
     }
-    let limit = threshold(options, field);
-    let labels = vtk.scalars("CellData").into_iter().find(|n| n.eq_ignore_ascii_case("non_design"));
+    let labels = names.into_iter().find(|n| n.eq_ignore_ascii_case("non_design"));
     let passive = labels.map(|name| vtk.array("CellData", Some(name), count)).transpose()?;
+    let cells = Cells {
+        format: "VTU",
+        positions: positions.as_chunks::<3>().0.iter().map(|p| DVec3::from_array(*p)).collect(),
+        kinds: kinds.into_iter().map(|kind| kind as u8).collect(),
+        corners: corners.into_iter().map(index).collect(),
+        ends: ends.into_iter().map(|end| end as usize).collect(),
+        field,
+        passive: passive.map(|passive| passive.into_iter().map(|p| p > 0.5).collect()),
+    };
+    surface_of_cells(file, cells, options)
+}
+
+const UNEQUAL: &str = "an array has not as many numbers as there are points or cells";
+
+/// A number that names a point; what is none names one beyond all points.
+pub(super) fn index(number: f64) -> u32 {
+    if number >= 0.0 && number < f64::from(u32::MAX) { number as u32 } else { u32::MAX }
+}
+
+/// The faces of the kept cells that are not between two of them.
+pub(super) fn surface_of_cells(
+    file: &str,
+    cells: Cells,
+    options: &ImportOptions,
+) -> Result<Soup, ImportError> {
+    let Cells { format, positions, kinds, corners, ends, field, passive } = cells;
+    let (count, points) = (ends.len(), positions.len());
+    if kinds.len() != count || field.as_ref().is_some_and(|(_, values)| values.len() != count) {
+        return Err(wrong(file, "cells", UNEQUAL));
+    }
+    let limit = threshold(options, field.as_ref().map_or("", |(name, _)| name));
     let mut border: BTreeMap<Vec<u32>, (Vec<u32>, bool)> = BTreeMap::new();
     let mut start = 0;
     for cell in 0..count {
-        let end = ends[cell] as usize;
+        let end = ends[cell];
         let Some(nodes) = corners.get(start..end) else {
             return Err(wrong(file, &format!("cell {cell}"), "its offsets point beyond the connectivity"));
         };
         start = end;
-        let is_passive = passive.as_ref().is_some_and(|p| p.get(cell).is_some_and(|&p| p > 0.5));
-        let inside = match options.inside {
+        let is_passive = passive.as_ref().is_some_and(|p| p.get(cell).is_some_and(|&p| p));
+        let inside = field.as_ref().is_none_or(|(_, density)| match options.inside {
             Inside::Above => density[cell] >= limit,
             Inside::Below => density[cell] <= limit,
-        };
+        });
         if !inside && !is_passive {
             continue;
         }
-        let Some((least, faces)) = faces_of(kinds[cell] as u8).filter(|(least, _)| nodes.len() >= *least)
-        else {
+        let Some((least, faces)) = faces_of(kinds[cell]).filter(|(least, _)| nodes.len() >= *least) else {
             let problem = format!(
                 "a cell of VTK type {} is not read; tetrahedra, hexahedra, wedges and pyramids are",
                 kinds[cell]
             );
             return Err(wrong(file, &format!("cell {cell}"), &problem));
         };
-        if let Some(&bad) = nodes[..least].iter().find(|&&v| !(v >= 0.0 && v < points as f64)) {
-            return Err(wrong(
-                file,
-                &format!("cell {cell}"),
-                &format!("it names point {bad}, but there are only {points}"),
-            ));
+        if nodes[..least].iter().any(|&v| v as usize >= points) {
+            let problem = format!("it names a point that is not there; there are only {points}");
+            return Err(wrong(file, &format!("cell {cell}"), &problem));
         }
         for face in faces {
-            let face: Vec<u32> = face.iter().map(|&k| nodes[k] as u32).collect();
+            let face: Vec<u32> = face.iter().map(|&k| nodes[k]).collect();
             let mut key = face.clone();
             key.sort_unstable();
             // A face of two kept cells lies inside.
@@ -145,22 +194,53 @@ fn cells(file: &str, vtk: &VtkFile<'_>, options: &ImportOptions) -> Result<Soup,
         }
     }
     if border.is_empty() {
-        let problem = format!("no cell has a {field} beyond {limit}; give another `threshold`");
-        return Err(wrong(file, "CellData", &problem));
+        let problem = match field {
+            Some((field, _)) => format!("no cell has a {field} beyond {limit}; give another `threshold`"),
+            None => "there are no solid cells".to_owned(),
+        };
+        return Err(wrong(file, "cells", &problem));
     }
-    let positions = positions.as_chunks::<3>().0.iter().map(|p| DVec3::from_array(*p)).collect();
     let (mut list, mut face_ends, mut labelled) = (Vec::new(), Vec::new(), Vec::new());
     for (face, is_passive) in border.into_values() {
         list.extend(face);
         face_ends.push(list.len());
         labelled.push(is_passive);
     }
-    let mut soup = Soup::from_polygons(file, "VTU", positions, &list, &face_ends)?;
+    let mut soup = Soup::from_polygons(file, format, positions, &list, &face_ends)?;
     // What is cut out of a grid brings all points of the grid; those without faces are no defect.
     soup.repairs.clear();
     soup.unindexed = true;
+    soup.taken = match (field, options.inside) {
+        (None, _) => "all solid cells".to_owned(),
+        (Some((field, _)), Inside::Above) => format!("cells with {field} of at least {limit}"),
+        (Some((field, _)), Inside::Below) => format!("cells with {field} of at most {limit}"),
+    };
     soup.non_design = passive.map(|_| labelled);
     Ok(soup)
+}
+
+/// Numbers on a regular grid, x fastest.
+#[derive(Debug)]
+pub(super) struct Image<'a> {
+    /// Name of the format for people.
+    pub(super) format: &'static str,
+    /// Name of the field.
+    pub(super) field: &'a str,
+    /// Numbers along x, y and z.
+    pub(super) counts: [usize; 3],
+    /// Where the first number is, and how far it is to the next.
+    pub(super) first: DVec3,
+    pub(super) step: DVec3,
+    pub(super) values: Vec<f64>,
+}
+
+impl Image<'_> {
+    /// The numbers of points or cells of a grid of that many points, if that can be.
+    pub(super) fn counts(points: [f64; 3], of_cells: bool) -> Option<[usize; 3]> {
+        let counts = points.map(|n| if of_cells { n - 1.0 } else { n });
+        let fits = counts.iter().all(|n| *n >= 1.0 && *n < 1e6) && counts.iter().product::<f64>() <= 1e9;
+        fits.then(|| counts.map(|n| n as usize))
+    }
 }
 
 fn image(file: &str, vtk: &VtkFile<'_>, options: &ImportOptions) -> Result<Soup, ImportError> {
@@ -171,25 +251,34 @@ fn image(file: &str, vtk: &VtkFile<'_>, options: &ImportOptions) -> Result<Soup,
         return Err(wrong(file, "ImageData", "extent, origin and spacing are six, three and three numbers"));
     };
     let (per_point, names) = (vtk.scalars("PointData"), vtk.scalars("CellData"));
-    let (group, names) = if per_point.is_empty() { ("CellData", names) } else { ("PointData", per_point) };
-    let extra = if group == "PointData" { 1.0 } else { 0.0 };
-    let counts = [x1 - x0 + extra, y1 - y0 + extra, z1 - z0 + extra];
-    if counts.iter().any(|n| !(*n >= 1.0 && *n < 1e6)) || counts.iter().product::<f64>() > 1e9 {
+    let of_cells = per_point.is_empty();
+    let (group, names) = if of_cells { ("CellData", names) } else { ("PointData", per_point) };
+    let Some(counts) = Image::counts([x1 - x0 + 1.0, y1 - y0 + 1.0, z1 - z0 + 1.0], of_cells) else {
         return Err(wrong(file, "ImageData", "its extent is empty or too large"));
-    }
-    let counts = counts.map(|n| n as usize);
+    };
     let field = choose(file, &names, options)?;
-    let total = counts.iter().product();
-    let values = vtk.array(group, Some(field), total)?;
+    let values = vtk.array(group, Some(field), counts.iter().product())?;
+    let step = DVec3::new(dx, dy, dz);
+    // Values of cells stand in their middles.
+    let middle = if of_cells { 0.5 * step } else { DVec3::ZERO };
+    let first = DVec3::new(ox, oy, oz) + step * DVec3::new(x0, y0, z0) + middle;
+    surface_in_image(file, &Image { format: "VTI", field, counts, first, step, values }, options)
+}
+
+/// Where the image has the value of the threshold.
+pub(super) fn surface_in_image(
+    file: &str,
+    image: &Image<'_>,
+    options: &ImportOptions,
+) -> Result<Soup, ImportError> {
+    let &Image { format, field, counts, first, step, ref values } = image;
+    let total: usize = counts.iter().product();
     if values.len() != total {
         let problem = format!("{} numbers, but {total} are announced", values.len());
         return Err(wrong(file, field, &problem));
     }
     let limit = threshold(options, field);
     let sign = if options.inside == Inside::Above { 1.0 } else { -1.0 };
-    let step = DVec3::new(dx, dy, dz);
-    // Values of cells stand in their middles.
-    let first = DVec3::new(ox, oy, oz) + step * DVec3::new(x0, y0, z0) + 0.5 * (1.0 - extra) * step;
     // One more layer all around that is outside, so that what reaches the border is closed there, half a step beyond.
     let padded = counts.map(|n| n + 2);
     let spread = values.iter().fold(0.0f64, |m, v| m.max((v - limit).abs()));
@@ -204,7 +293,9 @@ fn image(file: &str, vtk: &VtkFile<'_>, options: &ImportOptions) -> Result<Soup,
     };
     let point = |p: [usize; 3]| first + step * (DVec3::from_array(p.map(|k| k as f64)) - 1.0);
     let index = |p: [usize; 3]| (p[0] + padded[0] * (p[1] + padded[1] * p[2])) as u64;
-    let mut soup = Soup { format: "VTI", ..Soup::default() };
+    let side = if options.inside == Inside::Above { "more" } else { "less" };
+    let taken = format!("where {field} is {side} than {limit}");
+    let mut soup = Soup { format, taken, ..Soup::default() };
     let mut vertices: BTreeMap<(u64, u64), u32> = BTreeMap::new();
     // Six tetrahedra around the diagonal of each cube: one for each order in which the axes are walked.
     const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];

@@ -23,7 +23,7 @@ pub enum ImportError {
         path: String,
     },
     /// Neither the content nor the ending is that of a known format.
-    #[error("{file}: this is not a mesh that can be read; STL, OFF, OBJ, PLY, VTU and VTI can")]
+    #[error("{file}: this is not a mesh that can be read; STL, OFF, OBJ, PLY, VTU, VTI, VTK and INP can")]
     UnknownFormat {
         /// The file.
         file: String,

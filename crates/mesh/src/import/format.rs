@@ -1,7 +1,7 @@
 //! Which reader a file goes to: by content first, then by ending.
 
 use super::soup::{Soup, lines, words};
-use super::{ImportError, ImportOptions, density, obj, off, ply, stl, vtk};
+use super::{ImportError, ImportOptions, density, inp, legacy_vtk, obj, off, ply, stl, vtk};
 
 /// Parses a file of any known format.
 pub(super) fn parse(file: &str, bytes: &[u8], options: &ImportOptions) -> Result<Soup, ImportError> {
@@ -20,6 +20,12 @@ pub(super) fn parse(file: &str, bytes: &[u8], options: &ImportOptions) -> Result
     }
     if vtk::looks_like(start) {
         return density::parse(file, start, options);
+    }
+    if legacy_vtk::looks_like(start) {
+        return legacy_vtk::parse(file, start, options);
+    }
+    if inp::looks_like(start) {
+        return inp::parse(file, start, options);
     }
     if off::has_header(start) {
         return off::parse(file, text);

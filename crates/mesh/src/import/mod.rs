@@ -1,7 +1,7 @@
 //! Reads a mesh file and makes a closed, oriented, manifold [`Part`] of it, or says why it can not.
 //!
-//! Formats: STL (binary and ASCII), OFF, OBJ, PLY, and density fields in VTU and VTI, told apart by content first and by ending
-//! second.
+//! Formats: STL (binary and ASCII), OFF, OBJ, PLY; density fields in VTU, VTI and legacy VTK; decks of CalculiX and Abaqus. They
+//! are told apart by content first and by ending second.
 //!
 //! Guarantees of a returned part: every edge has two faces, every vertex one fan, faces look out of the material,
 //! coordinates are finite and in millimetres, each kept shell encloses volume, and every vertex and every label is
@@ -28,7 +28,9 @@ mod density;
 mod draft;
 mod error;
 mod format;
+mod inp;
 mod labels;
+mod legacy_vtk;
 mod manifold;
 mod obj;
 mod off;
@@ -113,7 +115,10 @@ pub fn read_source(
     progress.check()?;
 
     progress.step(1, STEPS, "welding");
-    let format = soup.format.to_owned();
+    let format = match soup.taken.as_str() {
+        "" => soup.format.to_owned(),
+        taken => format!("{}: {taken}", soup.format),
+    };
     let tolerance = if options.weld_tolerance > 0.0 {
         let bounds = soup.positions.iter().fold(None, |b: Option<(glam::DVec3, glam::DVec3)>, &p| {
             Some(b.map_or((p, p), |(low, high)| (low.min(p), high.max(p))))

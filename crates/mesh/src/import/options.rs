@@ -108,11 +108,12 @@ pub struct ImportOptions {
     /// Slack of the regions, as a fraction of the bounding box's diagonal. 1e-6 (default) covers the rounding of
     /// coordinates to 32-bit floats, 6e-8 of the largest coordinate, and of decimals with six digits.
     pub region_tolerance: f64,
-    /// VTU and VTI: the field that says where material is; by default `density`, or the only one there is.
+    /// VTU, VTI, VTK: the field that says where material is; by default `density`, or the only one there is. INP: the element
+    /// set that is kept; by default all solid elements.
     pub field: Option<String>,
-    /// VTU and VTI: material is where the field has at least this value; by default 0.5, and 0 for distances.
+    /// VTU, VTI, VTK: material is where the field has at least this value; by default 0.5, and 0 for distances.
     pub threshold: Option<f64>,
-    /// VTU and VTI: whether material is `above` the threshold (default) or `below`.
+    /// VTU, VTI, VTK: whether material is `above` the threshold (default) or `below`.
     pub inside: Inside,
 }
 

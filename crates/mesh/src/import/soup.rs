@@ -9,6 +9,8 @@ use glam::DVec3;
 pub(super) struct Soup {
     /// Name of the format for people.
     pub(super) format: &'static str,
+    /// What of the file is the part, where there is a choice. Empty where there is none.
+    pub(super) taken: String,
     /// True when every face brings its own three points (STL): then equal points are the rule, not a defect.
     pub(super) unindexed: bool,
     pub(super) positions: Vec<DVec3>,

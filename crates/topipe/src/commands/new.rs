@@ -30,6 +30,7 @@ struct Looked {
     filled: f64,
     features: Features,
     labels: Option<PathBuf>,
+    format: String,
 }
 
 /// The planes and cylinders that smoothing will hold.
@@ -94,6 +95,7 @@ fn look_at(mesh: &Path) -> Result<Looked, Failure> {
         filled: volume.abs() / size.iter().product::<f64>(),
         features: features(&part),
         labels: labels.is_file().then_some(labels),
+        format: part.import.format,
     })
 }
 
@@ -172,6 +174,9 @@ impl Looked {
             ),
             format!("unit {}: {}", self.units.name, self.units.why),
         ];
+        if let Some((_, taken)) = self.format.split_once(": ") {
+            text.push(format!("taken from the file: {taken}"));
+        }
         if !self.repairs.is_empty() {
             text.push(format!("repaired on import: {}", self.repairs.join(", ")));
         }
@@ -261,7 +266,7 @@ name = {name}
 kind = "import"
 path = {path}
 units = "{units}"                        # mm, cm, m, um, in, ft
-{labels}      # one 0 or 1 per face; 1 = non-design: not to be moved
+{field}{labels}      # one 0 or 1 per face; 1 = non-design: not to be moved
 # components = "all"                # keep islands; "largest" drops all but one
 
 [stage.smooth]
@@ -299,6 +304,11 @@ surface = "surface"
         name = quoted(name),
         name_text = name,
         units = looked.units.name,
+        field = match looked.format.split_once(": ").map(|(format, _)| format) {
+            None => "",
+            Some("INP") => SET,
+            Some(_) => FIELD,
+        },
         iterations = match looked.features {
             Features::Refused(_) =>
                 "iterations = 0                      # leaves the mesh as it is: see above",
@@ -307,6 +317,13 @@ surface = "surface"
     );
     text
 }
+
+const FIELD: &str = r#"# field = "density"                 # which field says where material is
+# threshold = 0.5                   # and from which value on; another one makes members thicker or thinner
+"#;
+
+const SET: &str = r#"# field = "KEPT"                    # the element set that is the part; all solid elements without it
+"#;
 
 const FRAME: &str = r#"
 [stage.frame]                       # centre lines of the beams

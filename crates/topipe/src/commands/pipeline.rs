@@ -5,7 +5,7 @@ use std::path::Path;
 use topipe_engine::{ExitCode, Override, Pipeline, Registry};
 
 /// Endings of files that are taken for pipelines by mistake.
-const MESHES: [&str; 6] = ["stl", "off", "obj", "ply", "vtu", "vti"];
+const MESHES: [&str; 8] = ["stl", "off", "obj", "ply", "vtu", "vti", "vtk", "inp"];
 
 /// A path as it is typed in a shell.
 fn typed(path: &Path) -> String {

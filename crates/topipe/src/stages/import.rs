@@ -12,8 +12,7 @@ impl Stage for Import {
     type Parameters = ImportOptions;
     type Output = Mesh;
     const KIND: &'static str = "import";
-    const SUMMARY: &'static str =
-        "Reads an STL, OFF, OBJ, PLY, VTU or VTI file, repairs what can be repaired, and labels its faces.";
+    const SUMMARY: &'static str = "Reads an STL, OFF, OBJ, PLY, VTU, VTI, VTK or INP file, repairs what can be repaired, and labels its faces.";
 
     fn code_version(&self) -> String {
         env!("TOPIPE_CODE_IMPORT").into()
