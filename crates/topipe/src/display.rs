@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::io::{IsTerminal, Write as _};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use topipe_engine::{Event, EventSink, ExitCode, ExportOutcome, Outcome, RunRecord};
 pub(crate) use topipe_progress::{duration, size};
 
@@ -51,9 +51,30 @@ pub(crate) fn span(time: Duration) -> String {
 pub(crate) struct Console {
     verbosity: Verbosity,
     bars: MultiProgress,
-    running: Mutex<HashMap<String, ProgressBar>>,
+    running: Mutex<HashMap<String, Running>>,
     /// How many stages are done, where there are many.
     whole: Mutex<Option<ProgressBar>>,
+}
+
+/// A stage that is being computed.
+struct Running {
+    bar: ProgressBar,
+    /// What is counted now, up to where, how far it is, and when that count began.
+    what: String,
+    total: u64,
+    done: u64,
+    since: Instant,
+}
+
+impl Running {
+    /// Takes note of a count; how long it has gone on. A stage that counts something else, or anew, is at another task.
+    fn count(&mut self, what: &str, done: u64, total: u64) -> Duration {
+        if self.what != what || self.total != total || done < self.done {
+            (self.what, self.total, self.since) = (what.to_owned(), total, Instant::now());
+        }
+        self.done = done;
+        self.since.elapsed()
+    }
 }
 
 /// How much longer something takes that goes on as it went: told once there is something to go by.
@@ -97,12 +118,13 @@ impl Console {
         }
         bar.set_prefix(stage.to_owned());
         bar.enable_steady_tick(Duration::from_millis(120));
-        self.running.lock().unwrap_or_else(PoisonError::into_inner).insert(stage.to_owned(), bar);
+        let running = Running { bar, what: String::new(), total: 0, done: 0, since: Instant::now() };
+        self.running.lock().unwrap_or_else(PoisonError::into_inner).insert(stage.to_owned(), running);
     }
 
     fn end(&self, stage: &str) {
-        if let Some(bar) = self.running.lock().unwrap_or_else(PoisonError::into_inner).remove(stage) {
-            bar.finish_and_clear();
+        if let Some(running) = self.running.lock().unwrap_or_else(PoisonError::into_inner).remove(stage) {
+            running.bar.finish_and_clear();
         }
     }
 }
@@ -132,11 +154,12 @@ impl EventSink for Console {
                 self.start(stage);
             }
             Event::StageProgress { stage, done, total, what } => {
-                if let Some(bar) = self.running.lock().unwrap_or_else(PoisonError::into_inner).get(stage) {
+                let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
+                if let Some(running) = running.get_mut(stage) {
                     let of = if *total > 0 { format!(" of {total}") } else { String::new() };
-                    let left = remaining(bar.elapsed(), *done, *total);
+                    let left = remaining(running.count(what, *done, *total), *done, *total);
                     let left = left.map_or_else(String::new, |left| format!(", about {} left", span(left)));
-                    bar.set_message(format!("{done}{of} {what}{left}"));
+                    running.bar.set_message(format!("{done}{of} {what}{left}"));
                 }
             }
             Event::StageWaiting { stage, holder } => {
@@ -205,13 +228,13 @@ impl EventSink for JsonLines {
     }
 }
 
-/// What a run did, for the terminal. `reports` are files written after the run; `broken` are figures out of their limits,
+/// What a run did, for the terminal. `reports` are files about the run, and whether each was written now; `broken` are figures out of their limits,
 /// or nothing where there are no figures.
 pub(crate) fn summary(
     record: &RunRecord,
     out: &Path,
     figures: &[(String, String)],
-    reports: &[std::path::PathBuf],
+    reports: &[(std::path::PathBuf, bool)],
     broken: Option<&[topipe_report::figures::Finding]>,
 ) -> String {
     let style = if colors_on_stdout() { Style::ANSI } else { Style::NONE };
@@ -250,7 +273,7 @@ fn styled_summary(
     record: &RunRecord,
     out: &Path,
     figures: &[(String, String)],
-    reports: &[std::path::PathBuf],
+    reports: &[(std::path::PathBuf, bool)],
     broken: Option<&[topipe_report::figures::Finding]>,
     style: Style,
 ) -> String {
@@ -283,8 +306,10 @@ fn styled_summary(
             };
             let _ = writeln!(text, "  {:files$}  {state}", export.file);
         }
-        for report in reports {
-            let _ = writeln!(text, "  {:files$}  written; open it in a browser", report.display());
+        for (report, written) in reports {
+            let state =
+                if *written { "written; open it in a browser" } else { "up to date; open it in a browser" };
+            let _ = writeln!(text, "  {:files$}  {state}", report.display());
         }
     }
     for (stage, figures) in figures {
@@ -318,6 +343,17 @@ mod tests {
         assert_eq!(wrapped("  one two three four five six\n", 20), "  one two three four\n    five six\n");
         let word = "a_path_that_is_longer_than_the_terminal";
         assert_eq!(wrapped(&format!("{word} {word}\n"), 20), format!("{word}\n  {word}\n"));
+    }
+
+    #[test]
+    fn a_count_that_begins_anew_has_its_own_time() {
+        let begun = Instant::now().checked_sub(Duration::from_secs(60)).unwrap();
+        let mut running =
+            Running { bar: ProgressBar::hidden(), what: "patches".into(), total: 10, done: 9, since: begun };
+        assert!(running.count("patches", 10, 10) >= Duration::from_secs(60));
+        assert!(running.count("patches", 1, 10) < Duration::from_secs(60));
+        running.since = begun;
+        assert!(running.count("edges", 2, 10) < Duration::from_secs(60));
     }
 
     #[test]

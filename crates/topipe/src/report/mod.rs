@@ -21,15 +21,16 @@ use topipe_engine::{
 };
 use topipe_report::{Document, Export, Figures, Parameter, Stage};
 
-/// The reports that a pipeline asks for, of the stages that took part in a run. Returns the files that were written.
+/// The reports that a pipeline asks for, of the stages that took part in a run. Returns the files, and whether each was written
+/// now.
 pub(crate) fn write_all(
     pipeline: &Pipeline,
     record: &RunRecord,
     cache: &Cache,
     registry: &Registry,
     out: &Path,
-) -> Result<Vec<PathBuf>, Failure> {
-    let mut written = Vec::new();
+) -> Result<Vec<(PathBuf, bool)>, Failure> {
+    let mut reports = Vec::new();
     for export in pipeline.exports.iter().filter(|export| export.exporter.after_run) {
         let name = &pipeline.stages[export.stage].name;
         if !record.stages.iter().any(|stage| stage.stage == *name) {
@@ -50,11 +51,10 @@ pub(crate) fn write_all(
         let path = out.join(&export.file);
         // Who interrupts a run does not want to wait; `topipe report` measures what there is later.
         let measure = record.code != ExitCode::Interrupted;
-        if write(&shown, cache, registry, &path, measure)? {
-            written.push(PathBuf::from(&export.file));
-        }
+        let written = write(&shown, cache, registry, &path, measure)?;
+        reports.push((PathBuf::from(&export.file), written));
     }
-    Ok(written)
+    Ok(reports)
 }
 
 /// The record of some stages only.
