@@ -46,6 +46,7 @@ mod patch_fit;
 mod patches;
 mod position_fit;
 mod refinement;
+mod reweighting;
 mod ribbon;
 mod samples;
 mod setting;

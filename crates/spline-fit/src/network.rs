@@ -24,15 +24,15 @@ pub(crate) struct Network {
     pub(crate) curves: Vec<Curve>,
 }
 
-/// Finds vertices and edges; `spans` are those of the curves.
+/// Finds vertices and edges; `spans` are those of the curves, `reach` the radii of the local fits, mm.
 pub(crate) fn network(
     setting: &Setting<'_>,
     samples: &[PatchSamples],
     spans: &[usize],
+    reach: &[f64],
 ) -> Result<Network, SplineFitError> {
     let layout = setting.layout;
-    let reach = setting.reach(spans);
-    let given = setting.given(samples, &reach);
+    let given = setting.given(samples, reach);
     let singular = |e: usize| {
         let at = layout.part.mesh.position(layout.edges[e].path[0]);
         SplineFitError::Singular { what: "edge", index: e, x: at.x, y: at.y, z: at.z }

@@ -38,9 +38,8 @@ pub struct Parameters {
     pub degree: u32,
     /// Interior knots in both directions, each in (0, 1), in order (source, section 3: 1/3, 2/3).
     pub interior_knots: Vec<f64>,
-    /// Weight of the distance to the mesh against the bending energy, in (0, 1] (source, section 2.3). With common tangents the
-    /// bending energy of a patch counts less, down to a thousandth, where the patch is not within the tolerance, and more where
-    /// it would fold.
+    /// Weight of the distance to the mesh against the bending energy, in (0, 1] (source, section 2.3). With common tangents
+    /// points of the mesh that are beyond the tolerance weigh more, and the bending energy does where a patch would fold.
     pub lambda: f64,
     /// Rounds in which the parameters of the mesh points are moved to the foot points on the last fit.
     pub foot_point_rounds: u32,

@@ -23,6 +23,9 @@ pub(crate) struct Border {
     pub(crate) ribbon: Option<Vec<DVec3>>,
 }
 
+/// Samples within this distance, in parameters, show how the mesh is turned somewhere: a third of a span of eight.
+const NEAR: f64 = 0.04;
+
 /// Control net of a patch: u fastest.
 #[derive(Debug, Clone)]
 pub(crate) struct Net {
@@ -33,8 +36,9 @@ pub(crate) struct Net {
 
 impl Net {
     /// The share of points, on a grid of about four points a span that includes the sides, where the patch is turned
-    /// over: its normal points away from the normals at the corners, blended.
-    pub(crate) fn folded(&self, corners: &[DVec3; 4]) -> f64 {
+    /// over: its normal points away from the normals at the corners, blended, and from that of the mesh there, which may
+    /// turn over itself around a spike.
+    pub(crate) fn folded(&self, corners: &[DVec3; 4], samples: &PatchSamples) -> f64 {
         let (nu, nv) = (2 * self.basis_u.len(), 2 * self.basis_v.len());
         let mut folded = 0;
         for j in 0..=nv {
@@ -42,7 +46,10 @@ impl Net {
                 let (u, v) = (i as f64 / nu as f64, j as f64 / nv as f64);
                 let [a, b, c, d] = *corners;
                 let about = a.lerp(b, u).lerp(d.lerp(c, u), v);
-                folded += usize::from(self.evaluate(u, v).normal().dot(about) <= 0.0);
+                let normal = self.evaluate(u, v).normal();
+                let over = normal.dot(about) <= 0.0
+                    && !samples.near([u, v], NEAR).any(|sample| normal.dot(sample.normal) > 0.0);
+                folded += usize::from(over);
             }
         }
         folded as f64 / ((nu + 1) * (nv + 1)) as f64
@@ -50,8 +57,12 @@ impl Net {
 
     /// The largest distance of a sample from the point with its parameters, mm.
     pub(crate) fn farthest(&self, samples: &PatchSamples) -> f64 {
-        let off = samples.samples.iter().map(|s| self.evaluate(s.u, s.v).position.distance(s.point));
-        off.fold(0.0, f64::max)
+        self.distances(samples).into_iter().fold(0.0, f64::max)
+    }
+
+    /// The distance of each sample from the point with its parameters, mm.
+    pub(crate) fn distances(&self, samples: &PatchSamples) -> Vec<f64> {
+        samples.samples.iter().map(|s| self.evaluate(s.u, s.v).position.distance(s.point)).collect()
     }
 
     pub(crate) fn evaluate(&self, u: f64, v: f64) -> SurfacePoint {

@@ -17,8 +17,8 @@ use topipe_progress::{Progress, UnitKey, Units};
 
 /// What a patch was fitted to, and what came of it.
 pub(crate) struct Fitted {
-    borders: [Border; 4],
-    corners: [DVec3; 4],
+    pub(crate) borders: [Border; 4],
+    pub(crate) corners: [DVec3; 4],
     pub(crate) net: Net,
     /// Parameters of the samples' foot points.
     places: Vec<[f64; 2]>,
@@ -77,12 +77,10 @@ impl Patches<'_> {
     ) -> Result<Vec<Fitted>, SplineFitError> {
         let Self { setting, parameters, units, progress } = *self;
         let layout = setting.layout;
-        let tolerance = parameters.largest_distance(&layout.part.mesh);
         let (borders, corners) = self.given(network, spans);
         let keys = if units.are_kept() { self.keys(samples, &borders, &corners) } else { Vec::new() };
         units.announce("patches", &keys);
-        let most = borders.iter().flatten().map(|b| b.spans).max().unwrap_or(1);
-        let grams: Vec<Gram> = (0..=most.ilog2()).map(|k| Gram::new(&hermite::basis(1 << k))).collect();
+        let grams = grams(borders.iter());
         let done = AtomicU64::new(0);
         let mut before: Vec<Option<Fitted>> = before.into_iter().map(Some).collect();
         before.resize_with(samples.len(), || None);
@@ -98,9 +96,7 @@ impl Patches<'_> {
                     put(samples, &same.places);
                     return Ok(same);
                 }
-                let grams = [0, 1].map(|k| &grams[borders[k].spans.ilog2() as usize]);
-                let task = PatchTask { borders, corners, grams, parameters };
-                let start = places(samples);
+                let task = PatchTask::new(borders, corners, &grams, parameters);
                 let compute = |samples: &mut PatchSamples| {
                     task.unfolded(samples).ok_or_else(|| {
                         let at = layout.part.mesh.position(layout.vertices[layout.corners(quad)[0] as usize]);
@@ -111,8 +107,6 @@ impl Patches<'_> {
                     Some(&key) => unit::recall(units, key, samples, borders, compute)?,
                     None => compute(samples)?,
                 };
-                // Not part of what is kept, so that another tolerance finds the same patches.
-                let net = task.nearer(net, samples, &start, tolerance);
                 let count = done.fetch_add(1, Ordering::Relaxed) + 1;
                 if count.is_multiple_of(64) {
                     progress.step(count, layout.quads.len() as u64, "patches");
@@ -127,6 +121,12 @@ impl Patches<'_> {
     }
 }
 
+/// The integrals of the bases with 1, 2, 4 ... spans, as many as the patches have.
+pub(crate) fn grams<'a>(borders: impl Iterator<Item = &'a [Border; 4]>) -> Vec<Gram> {
+    let most = borders.flatten().map(|b| b.spans).max().unwrap_or(1);
+    (0..=most.ilog2()).map(|k| Gram::new(&hermite::basis(1 << k))).collect()
+}
+
 /// Spans along the side of a patch.
 fn side_spans(curve: &Curve, spans: usize) -> usize {
     (curve.control.len() / 2 - 1).max(spans)
@@ -135,20 +135,32 @@ fn side_spans(curve: &Curve, spans: usize) -> usize {
 /// Factors on the bending energy with which a patch is tried until it is nowhere turned over.
 const STIFFER: [f64; 3] = [1.0, 1e2, 1e4];
 
-/// Factors on the bending energy where a patch is too far from the mesh: as much smoothness as the tolerance leaves (the
-/// discrepancy principle, Morozov 1966), as long as the patch does not fold. Of 1,409 patches of the bracket 108 are beyond the
-/// tolerance without, 89 with the first factor, 77 with all three; of 4,018 of beam-two-holes 64 and 53.
-const WEAKER: [f64; 3] = [1e-1, 1e-2, 1e-3];
-
 /// What a patch is fitted to, but for its samples.
-struct PatchTask<'a> {
+pub(crate) struct PatchTask<'a> {
     borders: &'a [Border; 4],
-    corners: &'a [DVec3; 4],
+    pub(crate) corners: &'a [DVec3; 4],
     grams: [&'a Gram; 2],
     parameters: &'a Parameters,
 }
 
-impl PatchTask<'_> {
+impl<'a> PatchTask<'a> {
+    pub(crate) fn new(
+        borders: &'a [Border; 4],
+        corners: &'a [DVec3; 4],
+        grams: &'a [Gram],
+        parameters: &'a Parameters,
+    ) -> Self {
+        let grams = [0, 1].map(|k| &grams[borders[k].spans.ilog2() as usize]);
+        Self { borders, corners, grams, parameters }
+    }
+
+    /// A fit to the samples where they are, which move to their foot points on it.
+    pub(crate) fn fit(&self, samples: &mut PatchSamples, factor: f64) -> Option<Net> {
+        let net = fit_patch(samples, self.borders, self.grams, factor * (1.0 - self.parameters.lambda))?;
+        crate::foot_points::correct(samples, |u, v| net.evaluate(u, v));
+        Some(net)
+    }
+
     /// A fit, and fits to the foot points on the one before, with `factor` on the bending energy.
     fn attempt(&self, samples: &mut PatchSamples, factor: f64) -> Option<Net> {
         let bending = factor * (1.0 - self.parameters.lambda);
@@ -167,7 +179,7 @@ impl PatchTask<'_> {
         for factor in STIFFER {
             put(samples, &start);
             let net = self.attempt(samples, factor)?;
-            let folded = net.folded(self.corners);
+            let folded = net.folded(self.corners, samples);
             if best.as_ref().is_none_or(|b| folded < b.0) {
                 best = Some((folded, net, places(samples)));
             }
@@ -179,37 +191,13 @@ impl PatchTask<'_> {
         put(samples, &found);
         Some(net)
     }
-
-    /// Weaker fits from the same `start` where `net` is farther from the samples than `tolerance`, mm; `net` where it is
-    /// not, and where they would fold, bring nothing or have no solution.
-    fn nearer(&self, mut net: Net, samples: &mut PatchSamples, start: &[[f64; 2]], tolerance: f64) -> Net {
-        let mut off = net.farthest(samples);
-        if off <= tolerance || net.folded(self.corners) > 0.0 {
-            return net;
-        }
-        let mut found = places(samples);
-        for factor in WEAKER {
-            put(samples, start);
-            let Some(weaker) = self.attempt(samples, factor) else { break };
-            let now = weaker.farthest(samples);
-            if now >= off || weaker.folded(self.corners) > 0.0 {
-                break;
-            }
-            (net, off, found) = (weaker, now, places(samples));
-            if off <= tolerance {
-                break;
-            }
-        }
-        put(samples, &found);
-        net
-    }
 }
 
-fn places(samples: &PatchSamples) -> Vec<[f64; 2]> {
+pub(crate) fn places(samples: &PatchSamples) -> Vec<[f64; 2]> {
     samples.samples.iter().map(|s| [s.u, s.v]).collect()
 }
 
-fn put(samples: &mut PatchSamples, places: &[[f64; 2]]) {
+pub(crate) fn put(samples: &mut PatchSamples, places: &[[f64; 2]]) {
     for (sample, place) in samples.samples.iter_mut().zip(places) {
         [sample.u, sample.v] = *place;
     }

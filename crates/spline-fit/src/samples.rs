@@ -18,6 +18,8 @@ pub(crate) struct Sample {
     pub(crate) v: f64,
     /// Share of the patch's area; all shares of a patch add up to 1.
     pub(crate) weight: f64,
+    /// Unit normal of the mesh; zero where it has none.
+    pub(crate) normal: DVec3,
 }
 
 /// A point of the mesh with its normal, for local fits: three a face.
@@ -42,6 +44,15 @@ pub(crate) struct PatchSamples {
     pub(crate) area: f64,
 }
 
+impl PatchSamples {
+    /// The samples within a distance of a place, in parameters, and the nearest in any case.
+    pub(crate) fn near(&self, place: [f64; 2], reach: f64) -> impl Iterator<Item = &Sample> {
+        let square = move |s: &Sample| (s.u - place[0]).powi(2) + (s.v - place[1]).powi(2);
+        let nearest = self.samples.iter().min_by(|a, b| square(a).total_cmp(&square(b)));
+        self.samples.iter().filter(move |s| square(s) <= reach * reach).chain(nearest)
+    }
+}
+
 /// Arc-length positions, 0 to 1, along a path of mesh vertices.
 pub(crate) fn arc_length(points: &[DVec3]) -> Vec<f64> {
     let mut along = vec![0.0];
@@ -59,6 +70,10 @@ pub(crate) fn arc_length(points: &[DVec3]) -> Vec<f64> {
 /// Inner points of a triangle and their weights: the three-point rule of degree two.
 const RULE: [[f64; 3]; 3] =
     [[2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0]];
+
+/// The share of a triangle's area that each of its corners stands for where it is a vertex of the mesh, in the rule of its
+/// corners and centroid that is exact for quadratic functions.
+const CORNER: f64 = 1.0 / 12.0;
 
 /// A quad with fewer faces than this is divided, each face into four, before it is mapped: the map of a few faces
 /// with all their corners on the sides is as coarse as they are.
@@ -151,6 +166,7 @@ pub(crate) fn sample(layout: &QuadLayout, quad: usize, faces: &[FaceId]) -> Opti
     let center = surface.iter().map(|s| s.point).sum::<DVec3>() / surface.len().max(1) as f64;
     let radius = surface.iter().map(|s| s.point.distance(center)).fold(0.0, f64::max);
     let degenerate = piece.mesh.triangles.is_empty();
+    let corners = piece.mesh.positions.len();
     while !degenerate && piece.mesh.triangles.len() < FACES {
         piece.divide();
     }
@@ -158,16 +174,33 @@ pub(crate) fn sample(layout: &QuadLayout, quad: usize, faces: &[FaceId]) -> Opti
     let all: Vec<FaceId> = mesh.faces().collect();
     let map = DiskMap::solve(mesh, &all, &piece.fixed)?;
     let area: f64 = all.iter().map(|&f| mesh.area_vector(f).length() / 2.0).sum();
-    let mut samples = Vec::with_capacity(3 * all.len());
+    // The vertices of the mesh inside: the tip of a spike is one of them.
+    let mut tips = vec![(0.0, DVec3::ZERO); corners];
+    for &f in &all {
+        let normal = mesh.area_vector(f);
+        let share = CORNER * normal.length() / 2.0 / area;
+        for v in mesh.triangles[f.index()].into_iter().filter(|v| v.index() < corners) {
+            if !piece.fixed.contains_key(&v) {
+                tips[v.index()].0 += share;
+                tips[v.index()].1 += normal;
+            }
+        }
+    }
+    let rest = 1.0 - tips.iter().map(|tip| tip.0).sum::<f64>();
+    let mut samples = Vec::with_capacity(3 * all.len() + corners);
+    for (v, &(weight, normal)) in tips.iter().enumerate().filter(|(_, tip)| tip.0 > 0.0) {
+        let (point, place) = (mesh.positions[v], map.at(VertexId::new(v)));
+        samples.push(Sample { point, u: place.x, v: place.y, weight, normal: normal.normalize_or_zero() });
+    }
     for f in all {
-        let weight = mesh.area_vector(f).length() / 2.0 / (3.0 * area);
+        let weight = rest * mesh.area_vector(f).length() / 2.0 / (3.0 * area);
         let points = mesh.corners(f);
         let places = mesh.triangles[f.index()].map(|v| map.at(v));
         for shares in RULE {
             let point = (0..3).map(|k| shares[k] * points[k]).sum();
             let place: DVec2 = (0..3).map(|k| shares[k] * places[k]).sum();
             if weight > 0.0 {
-                samples.push(Sample { point, u: place.x, v: place.y, weight });
+                samples.push(Sample { point, u: place.x, v: place.y, weight, normal: mesh.normal(f) });
             }
         }
     }

@@ -45,9 +45,10 @@ pub(crate) fn fit(
                 [sample.u, sample.v] = *place;
             }
         }
-        let network = network(&setting, &samples, refinement.spans())?;
-        let fitted = patches.fit(&mut samples, &network, refinement.spans(), before)?;
-        if !refinement.next(&setting, &fitted, &samples, progress) {
+        let network = network(&setting, &samples, refinement.spans(), &refinement.reach(&setting))?;
+        let mut fitted = patches.fit(&mut samples, &network, refinement.spans(), before)?;
+        if !refinement.next(&setting, &network, &fitted, &samples, progress) {
+            patches.draw_nearer(&mut fitted, &mut samples)?;
             let nets = insert_knots(&setting, &network.curves, &fitted, parameters.max_normal_jump, progress);
             let mut surface = assemble(&setting, network, nets);
             simplify(&mut surface, setting.borders.tolerance);
@@ -67,7 +68,7 @@ pub(crate) fn first_patches(
     let mut setting = Setting::new(layout)?;
     setting.make_corners(samples, parameters.spans as usize, &progress);
     let refinement = Refinement::new(&setting, parameters);
-    let network = network(&setting, samples, refinement.spans())?;
+    let network = network(&setting, samples, refinement.spans(), &refinement.reach(&setting))?;
     let patches = Patches { setting: &setting, parameters, units: &Units::none(), progress: &progress };
     let (borders, corners) = patches.given(&network, refinement.spans());
     Ok(patches.keys(samples, &borders, &corners))

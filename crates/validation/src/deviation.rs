@@ -16,12 +16,16 @@ const CHUNK: usize = 1024;
 /// From the nearest point of the triangulation to the distance from the true surface.
 pub(crate) type Refine<'a> = Box<dyn Fn(DVec3, &NearestPoint) -> f64 + Sync + 'a>;
 
+/// From a point and a distance that was found for it to the distance from the nearest place of all.
+pub(crate) type Search<'a> = Box<dyn Fn(DVec3, f64) -> f64 + Sync + 'a>;
+
 /// A surface ready for comparison.
 pub(crate) struct Surface<'a> {
     pub(crate) index: SurfaceIndex,
     /// Points and the area each stands for.
     samples: Vec<(DVec3, f64)>,
     refine: Option<Refine<'a>>,
+    search: Option<Search<'a>>,
 }
 
 impl<'a> Surface<'a> {
@@ -37,15 +41,23 @@ impl<'a> Surface<'a> {
         }
         let used = mesh.positions.iter().copied().zip(weights).filter(|&(_, weight)| weight > 0.0);
         let samples = used.chain(centroids).collect();
-        Self { index: SurfaceIndex::build(mesh), samples, refine: None }
+        Self { index: SurfaceIndex::build(mesh), samples, refine: None, search: None }
     }
 
     pub(crate) fn of_samples(
         triangulation: &TriangleMesh,
         samples: Vec<(DVec3, f64)>,
         refine: Refine<'a>,
+        search: Search<'a>,
     ) -> Self {
-        Self { index: SurfaceIndex::build(triangulation), samples, refine: Some(refine) }
+        let index = SurfaceIndex::build(triangulation);
+        Self { index, samples, refine: Some(refine), search: Some(search) }
+    }
+
+    /// The distance of `p`, for which `found` was found, from the nearest place of all. At the tip of a spike, which the
+    /// triangulation cuts off, its nearest point may lead to a foot that is not the nearest. Slow.
+    pub(crate) fn search(&self, p: DVec3, found: f64) -> f64 {
+        self.search.as_ref().map_or(found, |search| search(p, found))
     }
 
     /// The distance of `p`. `near` is a point of the triangulation, best that of the sample before: the search need
@@ -83,14 +95,9 @@ fn side(from: &Surface<'_>, to: &Surface<'_>) -> Option<Side> {
     }
     let mean = distances.iter().map(|&(d, w)| d * w).sum::<f64>() / area;
     let mean_square = distances.iter().map(|&(d, w)| d * d * w).sum::<f64>() / area;
-    let (mut max, mut at) = (f64::NEG_INFINITY, DVec3::ZERO);
-    for (&(d, _), &(p, _)) in distances.iter().zip(&from.samples) {
-        if d > max {
-            (max, at) = (d, p);
-        }
-    }
+    let max = largest(&distances, from, to)?;
     distances.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let (mut below, mut p95) = (0.0, max);
+    let (mut below, mut p95) = (0.0, max.0);
     for (d, weight) in distances {
         below += weight;
         if below >= 0.95 * area {
@@ -98,7 +105,23 @@ fn side(from: &Surface<'_>, to: &Surface<'_>) -> Option<Side> {
             break;
         }
     }
-    Some(Side { mean, mean_square, p95, max: (max, at) })
+    Some(Side { mean, mean_square, p95: p95.min(max.0), max })
+}
+
+/// The largest distance and its place. The samples with the largest ones are searched until that of a searched sample is
+/// the largest of all.
+fn largest(distances: &[(f64, f64)], from: &Surface<'_>, to: &Surface<'_>) -> Option<(f64, DVec3)> {
+    let mut known: Vec<f64> = distances.iter().map(|&(d, _)| d).collect();
+    let mut searched = vec![false; known.len()];
+    loop {
+        let farthest = (0..known.len()).max_by(|&i, &j| known[i].total_cmp(&known[j]).then(j.cmp(&i)))?;
+        let p = from.samples[farthest].0;
+        if searched[farthest] {
+            return Some((known[farthest], p));
+        }
+        searched[farthest] = true;
+        known[farthest] = to.search(p, known[farthest]);
+    }
 }
 
 /// The two-sided deviation, `None` where a surface has no area.

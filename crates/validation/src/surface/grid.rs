@@ -15,6 +15,9 @@ const STEPS: usize = 4;
 /// Distance of the triangulation of a cylinder from it, over the spacing: it only finds where to look.
 const CHORD: f64 = 0.02;
 
+/// Points in each span of the grids from which all patches around are searched.
+const SEARCH: usize = 4;
+
 /// The points of one patch.
 struct Grid {
     /// Point, area it stands for, parameters.
@@ -58,6 +61,7 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
         samples.push((shape.project(faces.centroid(f)), 0.75 * area));
     }
     let triangulation = mesh.clone();
+    let boxes: Vec<[DVec3; 2]> = surface.patches.iter().map(bounds).collect();
     let refine = move |p: DVec3, nearest: &NearestPoint| {
         let face = nearest.face.index();
         if face >= in_patches {
@@ -72,7 +76,8 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
         });
         distance(patch, p, start)
     };
-    Surface::of_samples(&mesh, samples, Box::new(refine))
+    let search = move |p: DVec3, found: f64| nearest_of_all(surface, &boxes, p, found);
+    Surface::of_samples(&mesh, samples, Box::new(refine), Box::new(search))
 }
 
 /// The distance from `p` to a face of known shape, given the nearest point of its triangulation.
@@ -155,6 +160,39 @@ fn distance(patch: &Patch, p: DVec3, [mut u, mut v]: [f64; 2]) -> f64 {
     best
 }
 
+/// The box around the control points, which contains the patch.
+fn bounds(patch: &Patch) -> [DVec3; 2] {
+    let all = || patch.control.iter().copied();
+    [all().fold(DVec3::INFINITY, DVec3::min), all().fold(DVec3::NEG_INFINITY, DVec3::max)]
+}
+
+/// The distance from `p` to the nearest patch of all; `found` where none is nearer.
+fn nearest_of_all(surface: &SplineSurface, boxes: &[[DVec3; 2]], p: DVec3, found: f64) -> f64 {
+    let mut best = found;
+    for (patch, [low, high]) in surface.patches.iter().zip(boxes) {
+        if p.clamp(*low, *high).distance(p) >= best {
+            continue;
+        }
+        let places = |basis: &topipe_spline_fit::Basis| -> Vec<f64> {
+            let breaks = basis.breaks();
+            let inner = breaks
+                .windows(2)
+                .flat_map(|w| (0..SEARCH).map(move |k| w[0] + k as f64 / SEARCH as f64 * (w[1] - w[0])));
+            inner.chain([1.0]).collect()
+        };
+        let (us, vs) = (places(&patch.basis_u), places(&patch.basis_v));
+        let nearest = us
+            .iter()
+            .flat_map(|&u| vs.iter().map(move |&v| [u, v]))
+            .map(|uv| (patch.evaluate(uv[0], uv[1]).position.distance_squared(p), uv))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, start)) = nearest {
+            best = best.min(distance(patch, p, start));
+        }
+    }
+    best
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -192,5 +230,36 @@ mod tests {
             }
         }
         assert!(chords > 1e-4, "the triangulation alone is not enough: {chords}");
+    }
+
+    #[test]
+    fn the_tip_of_a_narrow_spike_is_found() {
+        // A spike two hundredths wide in a patch that is sampled at quarters.
+        let inner: Vec<f64> = (1..100).map(|k| f64::from(k) / 100.0).collect();
+        let basis = Basis::clamped(3, &inner).unwrap();
+        let n = basis.len();
+        let control = (0..n * n)
+            .map(|k| {
+                let (i, j) = (k % n, k / n);
+                // It leans, so that the foot on the plane below the tip is not its own.
+                let spike = if i == 37 && j == 63 { DVec3::new(1.0, 0.0, 1.0) } else { DVec3::ZERO };
+                DVec3::new(i as f64 / 100.0, j as f64 / 100.0, 0.0) + spike
+            })
+            .collect();
+        let sides = [PatchSide { edge: 0, reversed: false }; 4];
+        let patch = Patch { sides, basis_u: basis.clone(), basis_v: basis, control };
+        let surface = SplineSurface {
+            vertices: Vec::new(),
+            edges: Vec::new(),
+            patches: vec![patch],
+            faces: Vec::new(),
+        };
+        let sampled = sample(&surface, 0.5);
+        let (u, v) = (0.36, 0.62);
+        let tip = surface.patches[0].evaluate(u, v).position;
+        assert!(tip.z > 0.3, "{tip}");
+        assert!(sampled.index.nearest(tip).unwrap().distance > 0.3, "the triangulation cuts it off");
+        let found = sampled.distance(tip, &mut None);
+        assert!(found > 0.1 && sampled.search(tip, found) < 1e-9, "{found}");
     }
 }
