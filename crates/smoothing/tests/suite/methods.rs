@@ -88,6 +88,33 @@ fn humphreys_classes_shrink_less_than_laplacian() {
     );
 }
 
+/// With part of the mesh frozen every method comes to rest: its steps fall below the tolerance and to a small share of the first.
+#[test]
+fn every_method_comes_to_rest() {
+    let mut part = noisy_sphere();
+    for v in part.mesh.vertices().filter(|&v| part.mesh.position(v).z < 0.0) {
+        part.frozen[v.index()] = true;
+    }
+    let plain = || Parameters { iterations: Some(400), tolerance: 0.01, ..Parameters::default() };
+    let runs = [
+        ("laplacian", Parameters { method: Method::Laplacian, ..plain() }),
+        ("sdu", Parameters { method: Method::Sdu, ..plain() }),
+        ("sdu updated", Parameters { method: Method::Sdu, weights: Weights::Updated, ..plain() }),
+        ("hc", Parameters { method: Method::Hc, ..plain() }),
+        ("taubin -0.6732", Parameters { method: Method::Taubin, ..plain() }),
+        ("taubin -0.53", Parameters { method: Method::Taubin, mu: -0.53, ..plain() }),
+        ("hc-sdu", plain()),
+        ("hc-sdu updated", Parameters { weights: Weights::Updated, ..plain() }),
+        ("contract", Parameters { method: Method::Contract, ..plain() }),
+    ];
+    for (name, parameters) in runs {
+        let record = smoothed(&part, &parameters).smoothing.expect("a record");
+        let (first, last) = (record.rms_steps[0], record.rms_steps[record.rms_steps.len() - 1]);
+        assert!(record.converged, "{name}: steps {first} to {last} in {} iterations", record.iterations);
+        assert!(last < 0.01 && last < 0.1 * first, "{name}: {first} to {last}");
+    }
+}
+
 #[test]
 fn a_higher_alpha_stays_closer_to_the_input() {
     let part = noisy_sphere();
