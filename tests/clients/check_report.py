@@ -87,7 +87,7 @@ def main():
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_path(), args=FLAGS + arguments.flag)
         if arguments.picture:
-            page = browser.new_page(viewport={"width": 1280, "height": 1190})
+            page = browser.new_page(viewport={"width": 1280, "height": 1250})
             page.goto(arguments.report.resolve().as_uri())
             page.wait_for_selector("html[data-viewer=ready]", state="attached", timeout=60000)
             page.screenshot(path=arguments.picture)
