@@ -5,7 +5,7 @@
 //! patch, and the place where the spline surface was farthest from the mesh. Such faces are found by how much they shrank, and
 //! where a group of them turns around something, its vertices become a membrane on the ring around, a ring wider until no sharp
 //! edge is left. On the nine reference parts: bracket 7 groups of 3 to 12 faces, bridge, support and cantilever-four one each, the
-//! others none; of these 10 membranes 2 have no edge beyond 60 degrees, 4 one beyond 100, and edges beyond 90 degrees on the four parts
+//! others none; before their faces are evened out, of these 10 membranes 2 have no edge beyond 60 degrees, 4 one beyond 100, and edges beyond 90 degrees on the four parts
 //! go from 1,881 to 1,853.
 //!
 //! A membrane of equal springs makes the faces of a long thread smaller from ring to ring, down to 2e-7 of the mean area. So its vertices
