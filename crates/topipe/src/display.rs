@@ -296,7 +296,9 @@ fn styled_summary(
     }
     if !record.exports.is_empty() || !reports.is_empty() {
         let _ = writeln!(text, "\n{bold}{}{end}", out.display());
-        let files = record.exports.iter().map(|export| export.file.chars().count()).max().unwrap_or(0);
+        let names = record.exports.iter().map(|export| export.file.chars().count());
+        let reports_too = reports.iter().map(|(report, _)| report.to_string_lossy().chars().count());
+        let files = names.chain(reports_too).max().unwrap_or(0);
         for export in &record.exports {
             let state = match &export.outcome {
                 ExportOutcome::Written => format!("written, {}", size(export.bytes.unwrap_or_default())),
@@ -309,7 +311,7 @@ fn styled_summary(
         for (report, written) in reports {
             let state =
                 if *written { "written; open it in a browser" } else { "up to date; open it in a browser" };
-            let _ = writeln!(text, "  {:files$}  {state}", report.display());
+            let _ = writeln!(text, "  {:files$}  {state}", report.to_string_lossy());
         }
     }
     for (stage, figures) in figures {
