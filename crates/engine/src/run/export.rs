@@ -1,6 +1,6 @@
 //! Writing artifacts into the output folder, and leaving alone what is there already.
 
-use super::executor::Executor;
+use super::executor::{Executor, lock};
 use super::failure::Failure;
 use super::{ExportOutcome, ExportRecord};
 use crate::cache::{Bucket, CacheError, Durability, Temporary};
@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// What was last written into an output folder, by file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -41,53 +43,116 @@ pub(super) fn sweep(pipeline: &Pipeline, out: &Path) {
     folders.iter().for_each(|folder| crate::cache::sweep(folder));
 }
 
-/// Writes the exports of the stages that have a result, in the order of the spec.
+/// What became of one export.
+enum Done {
+    /// Its stage has no result.
+    Skipped,
+    /// It was not begun before the run was interrupted.
+    Interrupted,
+    UpToDate(WrittenFile),
+    Finished(Result<WrittenFile, Failure>),
+}
+
+/// Exports that are finished, and what has been said about them: in the order of the spec, whichever is finished first.
+struct Told<'a> {
+    executor: &'a Executor<'a>,
+    finished: Vec<Option<Done>>,
+    /// How many of the first ones have been told.
+    count: usize,
+    records: Vec<ExportRecord>,
+    written: Written,
+}
+
+impl Told<'_> {
+    /// Takes what became of export `at`, and tells of all that come before the next unfinished one.
+    fn finish(&mut self, at: usize, done: Done, exports: &[&ExportNode]) {
+        self.finished[at] = Some(done);
+        while let Some(done) = self.finished.get_mut(self.count).and_then(Option::take) {
+            self.tell(exports[self.count], done);
+            self.count += 1;
+        }
+    }
+
+    fn tell(&mut self, export: &ExportNode, done: Done) {
+        let executor = self.executor;
+        let stage = executor.pipeline().stages[export.stage].name.clone();
+        let file = export.file.clone();
+        match done {
+            Done::Interrupted => {}
+            Done::Skipped => self.records.push(record(executor, export, ExportOutcome::Skipped, None)),
+            Done::UpToDate(known) => {
+                executor.events.emit(&Event::ExportUpToDate { file, stage });
+                self.records.push(record(executor, export, ExportOutcome::UpToDate, Some(&known)));
+                self.written.0.insert(export.file.clone(), known);
+            }
+            Done::Finished(Ok(new)) => {
+                executor.events.emit(&Event::ExportWritten { file, stage, bytes: new.bytes });
+                self.records.push(record(executor, export, ExportOutcome::Written, Some(&new)));
+                self.written.0.insert(export.file.clone(), new);
+            }
+            Done::Finished(Err(Failure { message, code })) => {
+                executor.events.emit(&Event::ExportFailed { file, stage, message: message.clone(), code });
+                let outcome = ExportOutcome::Failed { message, code };
+                self.records.push(record(executor, export, outcome, None));
+                self.written.0.remove(&export.file);
+            }
+        }
+    }
+}
+
+/// Writes the exports of the stages that have a result, as many at once as stages run at once.
 pub(super) fn write_all(executor: &Executor<'_>) -> Vec<ExportRecord> {
     let out = &executor.options.out;
     let name = std::path::absolute(out).unwrap_or_else(|_| out.clone()).to_string_lossy().into_owned();
     let before: Written = executor.cache().read_record(Bucket::Exports, &name).unwrap_or_default();
-    let mut written = before.clone();
-    let mut records = Vec::new();
     let of_stages = executor.pipeline().exports.iter().filter(|export| !export.exporter.after_run);
-    for export in of_stages.filter(|export| executor.is_selected(export.stage)) {
-        if executor.interrupt.is_raised() {
-            break;
+    let exports: Vec<&ExportNode> = of_stages.filter(|export| executor.is_selected(export.stage)).collect();
+    let told = Mutex::new(Told {
+        executor,
+        finished: exports.iter().map(|_| None).collect(),
+        count: 0,
+        records: Vec::new(),
+        written: before.clone(),
+    });
+    let next = AtomicUsize::new(0);
+    let work = || {
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(export) = exports.get(at) else { break };
+            let done = attend(executor, export, &before);
+            lock(&told).finish(at, done, &exports);
         }
-        let Some(artifact) = executor.artifact(export.stage) else {
-            records.push(record(executor, export, ExportOutcome::Skipped, None));
-            continue;
-        };
-        let path = out.join(&export.file);
-        if let Some(known) = written.0.get_mut(&export.file)
-            && is_up_to_date(known, &path, artifact, export)
-        {
-            let stage = executor.pipeline().stages[export.stage].name.clone();
-            executor.events.emit(&Event::ExportUpToDate { file: export.file.clone(), stage });
-            records.push(record(executor, export, ExportOutcome::UpToDate, Some(known)));
-            continue;
+    };
+    // Threads of their own and no work that others may steal: a thread that waits for a writer's parallel part would take up
+    // another export, and wait for an artifact that it is itself about to load.
+    std::thread::scope(|scope| {
+        for _ in 1..executor.options.jobs.clamp(1, exports.len().max(1)) {
+            scope.spawn(work);
         }
-        let outcome = write(executor, export, artifact, &path);
-        let stage = executor.pipeline().stages[export.stage].name.clone();
-        let file = export.file.clone();
-        match outcome {
-            Ok(new) => {
-                executor.events.emit(&Event::ExportWritten { file, stage, bytes: new.bytes });
-                records.push(record(executor, export, ExportOutcome::Written, Some(&new)));
-                written.0.insert(export.file.clone(), new);
-            }
-            Err(Failure { message, code }) => {
-                executor.events.emit(&Event::ExportFailed { file, stage, message: message.clone(), code });
-                records.push(record(executor, export, ExportOutcome::Failed { message, code }, None));
-                written.0.remove(&export.file);
-            }
-        }
-    }
+        work();
+    });
+    let Told { records, written, .. } = told.into_inner().unwrap_or_else(PoisonError::into_inner);
     if written != before
         && let Err(error) = executor.cache().write_record(Bucket::Exports, &name, &written)
     {
         tracing::warn!("exports will be written again by the next run: {error}");
     }
     records
+}
+
+/// Writes one export, unless nothing needs it.
+fn attend(executor: &Executor<'_>, export: &ExportNode, before: &Written) -> Done {
+    if executor.interrupt.is_raised() {
+        return Done::Interrupted;
+    }
+    let Some(artifact) = executor.artifact(export.stage) else { return Done::Skipped };
+    let path = executor.options.out.join(&export.file);
+    if let Some(mut known) = before.0.get(&export.file).cloned()
+        && is_up_to_date(&mut known, &path, artifact, export)
+    {
+        return Done::UpToDate(known);
+    }
+    Done::Finished(write(executor, export, artifact, &path))
 }
 
 fn record(

@@ -1,6 +1,8 @@
 //! The output folder.
 
-use crate::toy::{CHAIN, Workshop};
+use crate::toy::{CHAIN, Text, Workshop};
+use std::io::Write;
+use topipe_engine::Exporter;
 
 #[test]
 fn a_deleted_or_edited_export_is_restored() {
@@ -71,4 +73,26 @@ fn nothing_temporary_is_left() {
     assert_eq!(files, ["loud.txt", "run.json", "size.json"]);
     let locks = shop.cache().files(topipe_engine::cache::Bucket::Locks).unwrap();
     assert!(locks.is_empty(), "{locks:?}");
+}
+
+#[test]
+fn exports_are_written_side_by_side_and_told_in_order() {
+    let text = CHAIN
+        .replace("[export]", "[export]\n\"late.slow\" = \"loud\"\n\"a.txt\" = \"soft\"\n\"b.md\" = \"soft\"");
+    let mut shop = Workshop::new(&text);
+    shop.registry =
+        crate::toy::registry().with_exporter(Exporter::new::<Text>("slow", "1", |text, _, file| {
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            Ok(file.write_all(text.as_bytes())?)
+        }));
+    shop.options.jobs = 4;
+    let told =
+        ["late.slow written", "a.txt written", "b.md written", "loud.txt written", "size.json written"];
+    let (record, log) = shop.run();
+    assert_eq!(log[log.len() - 6..log.len() - 1], told);
+    let files: Vec<&str> = record.exports.iter().map(|export| export.file.as_str()).collect();
+    assert_eq!(files, ["late.slow", "a.txt", "b.md", "loud.txt", "size.json"]);
+    assert_eq!([shop.out("late.slow"), shop.out("b.md")], ["hello.!", "# b\nhello."]);
+    let (_, log) = shop.run();
+    assert_eq!(log[log.len() - 6..log.len() - 1], told.map(|line| line.replace("written", "up to date")));
 }
