@@ -1,7 +1,6 @@
 //! The output folder.
 
 use crate::toy::{CHAIN, Text, Workshop};
-use std::io::Write;
 use topipe_engine::Exporter;
 
 #[test]

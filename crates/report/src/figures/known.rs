@@ -1,7 +1,7 @@
 //! What is known about the figures of a report: words, limits, order.
 
 use super::limit::Limit::{
-    self, Above, AtMost, ChangeAtMost, Folds, Known, Loops, None as No, Same, Share, True, Zero,
+    self, Above, AtMost, ChangeAtMost, Folds, Known, Loops, None as No, OfBeams, Same, Share, True, Zero,
 };
 
 pub(super) struct Figure {
@@ -207,7 +207,7 @@ pub(super) const KNOWN: &[Figure] = &[
         "skeleton.e_center",
         "E_center: how far the centre line is off centre",
         "Centre line off centre",
-        AtMost(0.012),
+        OfBeams(0.012),
     ),
     figure("skeleton.e_center_by_length", "The same, weighted by length", "", No),
     figure("skeleton.out_of_object", "Points of the centre line outside the part", "", Zero),

@@ -207,6 +207,23 @@ mod tests {
     }
 
     #[test]
+    fn a_bulky_part_has_no_limit_for_its_centre() {
+        for (share, e_center, state) in [
+            (json!(0.8), 0.010, State::Kept),
+            (json!(0.8), 0.013, State::Broken),
+            (json!(null), 0.013, State::Broken),
+            (json!(0.2), 0.116, State::Free),
+        ] {
+            let report = json!({"skeleton": {"e_center": e_center, "beam_share": share}});
+            let sections = sections(&report);
+            let finding = find(&sections, "skeleton.e_center");
+            assert_eq!(finding.state, state, "{share} {e_center}");
+            let bulky = finding.limit.as_deref().unwrap_or_default().contains("20\u{a0}%");
+            assert_eq!(bulky, state == State::Free);
+        }
+    }
+
+    #[test]
     fn a_hole_that_changed_is_noticed() {
         let hole =
             |before: f64, after: f64| json!({"diameter_before_mm": before, "diameter_after_mm": after});
