@@ -46,6 +46,15 @@ fn the_report_is_written_when_what_it_shows_has_changed() {
     assert_eq!(by_hand.code, 0, "{}", by_hand.stderr);
     assert!(shop.read("mail/box.html").contains("<title>box"));
     assert_eq!(shop.topipe(&["report", "nowhere"]).code, 2);
+    // With a cache that has none of the results, and then with the one that has them, over the same file.
+    let record = ["report", "topipe-out/box/run.json", "-o", "mail/again.html"];
+    assert_eq!(shop.topipe(&[&record[..], &["--cache", "empty"]].concat()).code, 0);
+    let without = shop.read("mail/again.html");
+    assert_eq!(shop.topipe(&record).code, 0);
+    let with = shop.read("mail/again.html");
+    assert!(with.len() > without.len(), "{} with the results, {} without", with.len(), without.len());
+    assert_eq!(shop.topipe(&[&record[..], &["--cache", "empty"]].concat()).code, 0);
+    assert_eq!(shop.read("mail/again.html").len(), without.len());
 }
 
 #[test]

@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use results::Results;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use topipe_engine::cache::write_atomically;
+use topipe_engine::cache::{Bucket, write_atomically};
 use topipe_engine::{
     Cache, ContentHash, ExitCode, ExportOutcome, Outcome, Pipeline, Registry, RunRecord, StageRecord,
     parameter_fields,
@@ -77,7 +77,7 @@ pub(crate) fn write(
     measure: bool,
 ) -> Result<bool, Failure> {
     let measure = measure && unfinished::any(&record.stages);
-    let key = key(record, measure);
+    let key = key(record, cache, measure);
     if is_up_to_date(path, key) {
         return Ok(false);
     }
@@ -110,8 +110,8 @@ fn is_up_to_date(path: &Path, key: ContentHash) -> bool {
     known().unwrap_or(false)
 }
 
-/// What the report shows, but for times and for what was cached.
-fn key(record: &RunRecord, measure: bool) -> ContentHash {
+/// What the report shows, but for times and for what was cached. Results that the cache does not have are not shown.
+fn key(record: &RunRecord, cache: &Cache, measure: bool) -> ContentHash {
     let mut text = format!("{} {} {}\n", env!("TOPIPE_WRITER_REPORT"), record.program, record.pipeline);
     for stage in &record.stages {
         let state = match &stage.outcome {
@@ -119,7 +119,9 @@ fn key(record: &RunRecord, measure: bool) -> ContentHash {
             Outcome::Failed { message, .. } => format!("failed {message}"),
             Outcome::Skipped { because } => format!("skipped {because}"),
         };
-        text += &format!("{} {:?} {:?} {state}\n", stage.stage, stage.key, stage.artifact);
+        let there = |artifact| cache.path(Bucket::Artifacts, artifact).is_file();
+        let reach = if stage.artifact.is_none_or(there) { "" } else { "out of reach" };
+        text += &format!("{} {:?} {:?} {state}{reach}\n", stage.stage, stage.key, stage.artifact);
     }
     for export in &record.exports {
         text += &format!("{} {:?}\n", export.file, export.hash);
