@@ -21,7 +21,8 @@ pub enum Method {
 pub struct Parameters {
     /// Which tiles are made: "bordered" or "augmented-voronoi".
     pub method: Method,
-    /// Number of tiles to aim at (more are added where the topology asks for them); 0 = from `tile_size`.
+    /// Number of tiles to aim at, met within a tenth where topology and features leave room (about five patches come of a
+    /// tile); 0 = from `tile_size`.
     pub tiles: u32,
     /// Distance between neighbouring sites over the mean wall thickness (twice the volume over the area).
     pub tile_size: f64,

@@ -67,6 +67,24 @@ fn the_number_of_tiles_is_about_what_was_asked_for() {
 }
 
 #[test]
+fn the_number_of_bordered_tiles_is_within_a_tenth_where_there_is_room() {
+    for (name, most) in [("y-form", 600), ("bracket", 800), ("bridge", 900)] {
+        let part =
+            topipe_smoothing::smooth(&fixture(name), &Default::default(), &Progress::silent()).unwrap();
+        for tiles in [most / 2, most] {
+            let found =
+                tile(&part, &Parameters { tiles, ..Default::default() }, &Progress::silent()).unwrap();
+            assert_eq!(topipe_tiling::verify(&found), [], "{name}");
+            let ratio = found.tile_count() as f64 / f64::from(tiles);
+            assert!((0.9..1.11).contains(&ratio), "{name}: {} for {tiles}", found.tile_count());
+        }
+        // Fewer than the features allow: the fewest there are.
+        let few = tile(&part, &Parameters { tiles: 4, ..Default::default() }, &Progress::silent()).unwrap();
+        assert!(few.tile_count() < 400, "{name}: {}", few.tile_count());
+    }
+}
+
+#[test]
 fn a_mesh_that_is_too_coarse_is_refined() {
     // Nine squares: the smallest torus that is a simplicial complex. A simple dual of genus 1 needs seven tiles.
     let part = torus(3, 3, 0.4);

@@ -56,12 +56,53 @@ pub(crate) struct Construction<'a> {
     pub(crate) progress: &'a Progress,
 }
 
-/// Tiles a closed part that has been checked.
+/// How near the number of tiles has to come to the one asked for, and after how many tessellations the nearest is taken.
+const COUNT: f64 = 0.1;
+const TRIES: usize = 6;
+
+/// Tiles a closed part that has been checked. A number of tiles that is asked for is aimed at by tessellations with other sizes:
+/// features, bends and topology add tiles, and how many they add is known afterwards only.
 pub(crate) fn tile(
     part: &Part,
     parameters: &Parameters,
     progress: &Progress,
     sizes: Option<&[f64]>,
+) -> Result<Tiling, TilingError> {
+    if parameters.tiles == 0 {
+        return tile_scaled(part, parameters, progress, sizes, 1.0);
+    }
+    let ratio = |tiling: &Tiling| tiling.tile_count().max(1) as f64 / f64::from(parameters.tiles);
+    let mut scale = 1.0;
+    let mut nearest = tile_scaled(part, parameters, progress, sizes, scale)?;
+    for _ in 1..TRIES {
+        let off = ratio(&nearest);
+        if off.ln().abs() <= COUNT.ln_1p() {
+            break;
+        }
+        // As many as areas say, in bounded steps.
+        scale *= off.sqrt().clamp(0.4, 2.5);
+        let next = match tile_scaled(part, parameters, progress, sizes, scale) {
+            Ok(next) => next,
+            Err(TilingError::NotConverged { .. }) => break,
+            Err(error) => return Err(error),
+        };
+        // Sizes that bring it no nearer are at an end: no fewer tiles for the topology, or no smaller ones.
+        if ratio(&next).ln().abs() >= off.ln().abs() {
+            break;
+        }
+        nearest = next;
+    }
+    progress.remark(&format!("{} tiles where {} were asked for", nearest.tile_count(), parameters.tiles));
+    Ok(nearest)
+}
+
+/// The tessellation with sizes scaled by a factor.
+fn tile_scaled(
+    part: &Part,
+    parameters: &Parameters,
+    progress: &Progress,
+    sizes: Option<&[f64]>,
+    scale: f64,
 ) -> Result<Tiling, TilingError> {
     let refiner = Refiner::new(part)?;
     let wall = 2.0 * part.mesh.volume().abs() / part.mesh.area();
@@ -87,12 +128,13 @@ pub(crate) fn tile(
         .filter(|f| region_of_face[f.index()] == RegionId::NONE)
         .map(|f| part.mesh.area_vector(f).length() / 2.0)
         .sum();
-    let spacing = if parameters.tiles > 0 {
+    let size = if parameters.tiles > 0 {
         // Hexagonal tiles of equal area.
         (2.0 * free_area.max(1e-3 * part.mesh.area()) / (3f64.sqrt() * f64::from(parameters.tiles))).sqrt()
     } else {
         parameters.tile_size * wall
     };
+    let spacing = scale * size;
     let bends = match parameters.bend {
         bend if bend > 0.0 => sizes::factors(&refiner, &region_of_face, spacing, bend.to_radians()),
         _ => vec![1.0; part.mesh.face_count()],
