@@ -1,8 +1,8 @@
 //! Where curves need more knots.
 //!
 //! After each fit the distance of the samples from their patches is measured. Edges of patches where it is above its
-//! limit get a finer curve, and the network is computed anew. Curves that are then still too far from the mesh, because
-//! the local fits reach across a ridge or a notch, get local fits that reach less far.
+//! limit get a finer curve, and the network is computed anew. Where it is the curve itself that is too far from the mesh,
+//! because its local fits reach across a ridge or a notch, they reach less far from then on.
 
 use crate::Parameters;
 use crate::fans::EdgeRole;
@@ -18,7 +18,8 @@ use topipe_progress::Progress;
 /// Most spans of the curve along an edge.
 const MOST_SPANS: usize = 8;
 
-/// Factor on the radii of local fits along edges that are too far from the mesh.
+/// Factor on the radii of local fits along edges that are too far from the mesh. Largest deviation over the diagonal, x 1e-2, on
+/// bracket, support, bell-crank: 0.17, 0.18, 0.25 with a quarter; 0.22, 0.28, 0.19 with 0.35; 0.22, 0.28, 0.19 with a half.
 const CLOSER: f64 = 0.25;
 /// Points of a curve in each of its spans to which the distance of the mesh is measured.
 const POINTS: usize = 8;
@@ -27,7 +28,7 @@ const POINTS: usize = 8;
 pub(crate) struct Refinement {
     spans: Vec<usize>,
     left: u32,
-    /// By what the radii of the local fits are less than usual, one per edge.
+    /// Factors on the radii of the local fits, one per edge.
     closer: Vec<f64>,
     /// Largest distance, mm.
     tolerance: f64,

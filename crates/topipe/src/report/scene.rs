@@ -42,7 +42,8 @@ struct Builder<'a> {
     histograms: Vec<Histogram>,
 }
 
-/// Search structures by the stage of the mesh, each built when it is first asked for.
+/// Search structures by the stage of the mesh, each built when it is first asked for. Building one must have no parallel part: a
+/// thread that waits for it would take up other layers, and wait for the structure that it is itself building.
 type Indices = HashMap<String, OnceLock<SurfaceIndex>>;
 
 /// Triangles of meshes, tiles and quadrilaterals that a page may hold: about 20 MB, and what a browser turns without a card
