@@ -5,10 +5,10 @@
 //! sector between two feature edges are mapped to a sector of the disk. Where that makes the angles of the corners worse
 //! all of it is taken back.
 
-use crate::QuadMatchingError;
 use crate::refine::Regions;
 use crate::sides::Tiled;
 use crate::spokes::Cutter;
+use crate::{QuadMatchingError, Side};
 use glam::{DMat2, DVec2};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeMap;
@@ -159,8 +159,29 @@ fn path(regions: &Regions, (r, k): Corner) -> Vec<VertexId> {
     path
 }
 
+/// Sides of a quad this many times as long as those opposite to them cost nothing. Crossings of the triangulated bell-crank and
+/// its largest deviation over the diagonal, x 1e-2: 1,476 and 0.25 without this cost, 772 and 0.18 from six times on, 837 and 0.16
+/// from four times on.
+const TAPER: f64 = 4.0;
+
+/// What it costs that sides of a quad are much shorter than those opposite to them: it is a triangle nearly, and its parameter
+/// lines crowd at the short side. Angles do not show it.
+fn taper(regions: &Regions, r: usize) -> f64 {
+    let sides = &regions.sides[r];
+    if sides.len() != 4 {
+        return 0.0;
+    }
+    let mesh = &regions.tiled.refiner.part().mesh;
+    let length = |side: Side| -> f64 {
+        let path = &regions.edges[side.edge as usize].path;
+        path.windows(2).map(|w| mesh.position(w[0]).distance(mesh.position(w[1]))).sum()
+    };
+    let cost = |a: f64, b: f64| ((a.max(b) / a.min(b)).ln() - TAPER.ln()).clamp(0.0, 10.0).powi(2);
+    cost(length(sides[0]), length(sides[2])) + cost(length(sides[1]), length(sides[3]))
+}
+
 /// The cost of the corners that edges from a vertex have to do with: those at the vertex, and at the far ends of the
-/// edges on either hand.
+/// edges on either hand; and of the quads around it.
 fn star_cost(regions: &Regions, fan: &Fan) -> f64 {
     let at = |(r, k): Corner| {
         let side = regions.sides[r][k];
@@ -170,7 +191,7 @@ fn star_cost(regions: &Regions, fan: &Fan) -> f64 {
     let mut sum = 0.0;
     for (i, &(r, k)) in fan.corners.iter().enumerate() {
         let count = regions.sides[r].len();
-        sum += at((r, k));
+        sum += at((r, k)) + taper(regions, r);
         if fan.closed || i > 0 {
             sum += at((r, (k + 1) % count));
         }
