@@ -25,7 +25,8 @@ pub struct Parameters {
     /// Spans along an edge to begin with, a power of two, 1 to 16 (continuity "tangent"). Below four the normals do not
     /// agree at all corners.
     pub spans: u32,
-    /// Times the spans may be doubled, up to 8, where the surface is not within `tolerance`.
+    /// Times the spans may be doubled, up to 8, where the surface is not within `tolerance`, and once more along edges that are then
+    /// still farther from the mesh than that by half.
     pub refinements: u32,
     /// Largest distance of the mesh from the surface that is not refined, over the diagonal of the part.
     pub tolerance: f64,
