@@ -64,21 +64,25 @@ pub enum ConnectivityError {
 /// Vertices per task.
 const GRAIN: usize = 4096;
 
-/// A half-edge as its lower vertex sees it.
-#[derive(Clone, Copy)]
-struct Ascent {
-    high: VertexId,
-    half_edge: HalfEdgeId,
-    /// Whether it leaves the lower vertex.
-    up: bool,
-}
+/// Meshes with fewer vertices are one task: waking another thread takes longer than it saves.
+const SMALL: usize = 4 * GRAIN;
 
 /// All vertices exist, and no triangle uses one twice.
 fn check_triangles(mesh: &TriangleMesh) -> Result<(), ConnectivityError> {
     let count = mesh.vertex_count();
     let problem = |t: &[VertexId; 3]| (0..3).find(|&k| t[k].index() >= count || t[k] == t[(k + 1) % 3]);
-    let bad = mesh.triangles.par_iter().with_min_len(GRAIN).position_first(|t| problem(t).is_some());
-    let Some(f) = bad else { return Ok(()) };
+    // Whole chunks first: a loop that never ends early takes several triangles at once.
+    let sound = |triangles: &[[VertexId; 3]]| {
+        triangles.iter().fold(true, |sound, &[a, b, c]| {
+            sound & (a.max(b).max(c).index() < count) & (a != b) & (b != c) & (c != a)
+        })
+    };
+    let all_sound =
+        if count < SMALL { sound(&mesh.triangles) } else { mesh.triangles.par_chunks(GRAIN).all(sound) };
+    if all_sound {
+        return Ok(());
+    }
+    let Some(f) = mesh.triangles.iter().position(|t| problem(t).is_some()) else { return Ok(()) };
     let t = &mesh.triangles[f];
     let vertex = problem(t).map_or(VertexId::NONE, |k| t[k]);
     Err(if vertex.index() >= count {
@@ -98,74 +102,87 @@ impl Connectivity {
         let half_edges = mesh.face_count() * 3;
         check_triangles(mesh)?;
         let origin = mesh.triangles.as_flattened().to_vec();
-        // Half-edges are bucketed by the smaller of their two vertices: twins land in the same small bucket. An entry
-        // carries all that matching asks for, so that it reads memory in order.
-        let mut fill = vec![0u32; vertex_count + 1];
-        for t in &mesh.triangles {
-            for k in 0..3 {
-                fill[t[k].min(t[(k + 1) % 3]).index() + 1] += 1;
-            }
-        }
-        for v in 0..vertex_count {
-            fill[v + 1] += fill[v];
-        }
-        let mut bucket =
-            vec![Ascent { high: VertexId::NONE, half_edge: HalfEdgeId::NONE, up: false }; half_edges];
+        let mut outgoing = vec![HalfEdgeId::NONE; vertex_count];
+        let mut degree = vec![0u32; vertex_count];
+        let mut start = vec![0u32; vertex_count + 1];
         for (f, t) in mesh.triangles.iter().enumerate() {
             for k in 0..3 {
-                let (a, b) = (t[k], t[(k + 1) % 3]);
-                let slot = &mut fill[a.min(b).index()];
-                bucket[*slot as usize] =
-                    Ascent { high: a.max(b), half_edge: HalfEdgeId::of(FaceId::new(f), k), up: a < b };
-                *slot += 1;
-            }
-        }
-        let mut twin = vec![HalfEdgeId::NONE; half_edges];
-        let mut first = 0;
-        for v in 0..vertex_count {
-            // After filling, the start of a bucket is the end of the one before.
-            let end = fill[v] as usize;
-            let members = &bucket[first..end];
-            first = end;
-            for (i, a) in members.iter().enumerate() {
-                let mut matched = false;
-                for b in members[i + 1..].iter().filter(|b| b.high == a.high) {
-                    if a.up == b.up || matched || twin[a.half_edge.index()].is_some() {
-                        let (v, high) = (VertexId::new(v), a.high);
-                        let (from, to) = if a.up { (v, high) } else { (high, v) };
-                        return Err(ConnectivityError::NonManifoldEdge {
-                            from: from.0,
-                            to: to.0,
-                            first: a.half_edge.face().0,
-                            second: b.half_edge.face().0,
-                        });
-                    }
-                    matched = true;
-                    twin[a.half_edge.index()] = b.half_edge;
-                    twin[b.half_edge.index()] = a.half_edge;
+                start[t[k].min(t[(k + 1) % 3]).index() + 1] += 1;
+                degree[t[k].index()] += 1;
+                if !outgoing[t[k].index()].is_some() {
+                    outgoing[t[k].index()] = HalfEdgeId::of(FaceId::new(f), k);
                 }
             }
         }
-        drop((bucket, fill));
-        let border_count = twin.iter().filter(|t| !t.is_some()).count();
-        let edge_count = (half_edges - border_count) / 2 + border_count;
-
+        for v in 0..vertex_count {
+            start[v + 1] += start[v];
+        }
+        // Half-edges are bucketed by the smaller of their two vertices: twins land in the same small bucket, those that leave the
+        // vertex from its front on, those that come to it from its back. An entry carries all that matching asks for, so that
+        // it reads memory in order.
+        let mut bucket = vec![0u64; half_edges];
+        let mut free: Vec<[u32; 2]> = start.windows(2).map(|w| [w[0], w[1]]).collect();
+        for (f, t) in mesh.triangles.iter().enumerate() {
+            for k in 0..3 {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                let [front, back] = &mut free[a.min(b).index()];
+                let slot = if a < b {
+                    *front += 1;
+                    *front - 1
+                } else {
+                    *back -= 1;
+                    *back
+                };
+                let half_edge = HalfEdgeId::of(FaceId::new(f), k);
+                bucket[slot as usize] = u64::from(a.max(b).0) << 32 | u64::from(half_edge.0);
+            }
+        }
+        let high = |entry: &u64| (entry >> 32) as u32;
+        let half_edge = |entry: &u64| HalfEdgeId(*entry as u32);
+        let mut twin = vec![HalfEdgeId::NONE; half_edges];
+        let mut matched = 0;
+        for v in 0..vertex_count {
+            let middle = free[v][0] as usize;
+            let (leaving, coming) =
+                (&bucket[start[v] as usize..middle], &bucket[middle..start[v + 1] as usize]);
+            let twice = |list: &[u64], leaves: bool| {
+                let (i, a) = list
+                    .iter()
+                    .enumerate()
+                    .find(|(i, a)| list[i + 1..].iter().any(|b| high(b) == high(a)))?;
+                let b = list[i + 1..].iter().find(|b| high(b) == high(a))?;
+                let (from, to) = if leaves { (v as u32, high(a)) } else { (high(a), v as u32) };
+                let (a, b) = (half_edge(a).face().0, half_edge(b).face().0);
+                Some(ConnectivityError::NonManifoldEdge { from, to, first: a.min(b), second: a.max(b) })
+            };
+            if let Some(error) = twice(leaving, true).or_else(|| twice(coming, false)) {
+                return Err(error);
+            }
+            for a in leaving {
+                if let Some(b) = coming.iter().find(|b| high(b) == high(a)) {
+                    twin[half_edge(a).index()] = half_edge(b);
+                    twin[half_edge(b).index()] = half_edge(a);
+                    matched += 1;
+                }
+            }
+        }
+        drop((bucket, free, start));
+        let edge_count = half_edges - matched;
+        let border_count = edge_count - matched;
         // The stored outgoing half-edge of a border vertex is the one without a twin, so that turning counter-clockwise
         // from it visits the whole open fan.
-        let mut outgoing = vec![HalfEdgeId::NONE; vertex_count];
-        let mut degree = vec![0u32; vertex_count];
-        for h in 0..half_edges {
-            let v = origin[h].index();
-            degree[v] += 1;
-            if !outgoing[v].is_some() || !twin[h].is_some() {
-                outgoing[v] = HalfEdgeId::new(h);
+        if border_count > 0 {
+            for h in (0..half_edges).filter(|&h| !twin[h].is_some()) {
+                outgoing[origin[h].index()] = HalfEdgeId::new(h);
             }
         }
         let connectivity = Self { twin, outgoing, origin, edge_count, border_count };
-        let torn = (0..vertex_count)
-            .into_par_iter()
-            .with_min_len(GRAIN)
-            .find_first(|&v| connectivity.outgoing(VertexId::new(v)).count() != degree[v] as usize);
+        let is_torn = |&v: &usize| connectivity.outgoing(VertexId::new(v)).count() != degree[v] as usize;
+        let torn = if vertex_count < SMALL {
+            (0..vertex_count).find(is_torn)
+        } else {
+            (0..vertex_count).into_par_iter().with_min_len(GRAIN).find_first(is_torn)
+        };
         if let Some(v) = torn {
             return Err(ConnectivityError::NonManifoldVertex { vertex: v as u32 });
         }
@@ -237,25 +254,28 @@ impl Connectivity {
     /// The vertices next to each vertex, as offsets and a flat list (compressed rows). Around an interior vertex
     /// they are in counter-clockwise order.
     pub fn vertex_neighbors(&self) -> (Vec<u32>, Vec<VertexId>) {
-        let chunks: Vec<(Vec<u32>, Vec<VertexId>)> = (0..self.outgoing.len().div_ceil(GRAIN))
-            .into_par_iter()
-            .map(|chunk| {
-                let (mut ends, mut list) = (Vec::with_capacity(GRAIN), Vec::with_capacity(7 * GRAIN));
-                for v in chunk * GRAIN..((chunk + 1) * GRAIN).min(self.outgoing.len()) {
-                    let mut last = HalfEdgeId::NONE;
-                    for h in self.outgoing(VertexId::new(v)) {
-                        list.push(self.target(h));
-                        last = h;
-                    }
-                    // An open fan has one more neighbour than faces.
-                    if last.is_some() && !self.twin(last.prev()).is_some() {
-                        list.push(self.origin(last.prev()));
-                    }
-                    ends.push(list.len() as u32);
+        let rows_of_chunk = |chunk: usize| {
+            let (mut ends, mut list) = (Vec::with_capacity(GRAIN), Vec::with_capacity(7 * GRAIN));
+            for v in chunk * GRAIN..((chunk + 1) * GRAIN).min(self.outgoing.len()) {
+                let mut last = HalfEdgeId::NONE;
+                for h in self.outgoing(VertexId::new(v)) {
+                    list.push(self.target(h));
+                    last = h;
                 }
-                (ends, list)
-            })
-            .collect();
+                // An open fan has one more neighbour than faces.
+                if last.is_some() && !self.twin(last.prev()).is_some() {
+                    list.push(self.origin(last.prev()));
+                }
+                ends.push(list.len() as u32);
+            }
+            (ends, list)
+        };
+        let chunks = 0..self.outgoing.len().div_ceil(GRAIN);
+        let chunks: Vec<(Vec<u32>, Vec<VertexId>)> = if self.outgoing.len() < SMALL {
+            chunks.map(rows_of_chunk).collect()
+        } else {
+            chunks.into_par_iter().map(rows_of_chunk).collect()
+        };
         let mut start = Vec::with_capacity(self.outgoing.len() + 1);
         let mut list = Vec::with_capacity(chunks.iter().map(|c| c.1.len()).sum());
         start.push(0);

@@ -53,8 +53,13 @@ impl TriangleMesh {
             let [a, b, c] = t.map(|v| self.position(v));
             a.distance(b) + b.distance(c) + c.distance(a)
         };
-        let chunks: Vec<f64> =
-            self.triangles.par_chunks(CHUNK).map(|chunk| chunk.iter().map(around).sum()).collect();
+        let sum_of = |chunk: &[[VertexId; 3]]| -> f64 { chunk.iter().map(around).sum() };
+        // A single chunk starts no threads.
+        let chunks: Vec<f64> = if self.face_count() <= CHUNK {
+            vec![sum_of(&self.triangles)]
+        } else {
+            self.triangles.par_chunks(CHUNK).map(sum_of).collect()
+        };
         let sum: f64 = chunks.iter().sum();
         sum / (3 * self.face_count()) as f64
     }

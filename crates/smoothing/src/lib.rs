@@ -55,8 +55,11 @@ mod locality;
 mod methods;
 mod outline;
 mod parameters;
+mod reorder;
+mod rows;
 mod smooth;
 pub mod study;
+mod vector;
 mod volume;
 
 pub use error::SmoothingError;

@@ -6,11 +6,12 @@
 //! Morton curve, where half of them waited for neighbours, and 1.05 so. The curve comes first all the same, because the search
 //! itself reads neighbours. Small meshes fit the cache as they are.
 
+use crate::reorder::{breadth_first, inverse, sort_strips};
 use rayon::prelude::*;
 use topipe_mesh::{DVec3, FeatureEdge, Part, TriangleMesh, VertexId};
 
 /// Meshes with fewer vertices keep their numbering: four arrays of positions fit a second-level cache and a bit.
-const SMALL: usize = 50_000;
+pub(crate) const SMALL: usize = 50_000;
 
 /// A numbering of vertices and faces.
 pub(crate) struct Order {
@@ -23,52 +24,54 @@ pub(crate) struct Order {
 }
 
 impl Order {
-    /// The order breadth first; `None` for a mesh that needs none. All coordinates must be finite and all triangles
-    /// name vertices that exist.
-    pub(crate) fn of(mesh: &TriangleMesh) -> Option<Self> {
+    /// The order breadth first, and the mesh in it; `None` for a mesh that needs none. All coordinates must be finite and all
+    /// triangles name vertices that exist.
+    pub(crate) fn of(mesh: &TriangleMesh) -> Option<(Self, TriangleMesh)> {
         (mesh.vertex_count() >= SMALL).then(|| Self::breadth_first(mesh))
     }
 
-    fn breadth_first(mesh: &TriangleMesh) -> Self {
+    fn breadth_first(mesh: &TriangleMesh) -> (Self, TriangleMesh) {
         // The faces of a file can have any order: they are looked at once to sort them along the curve, and from there on in that order.
-        let curve = Self::along(along_curve(mesh), mesh.triangles.as_slice(), |v: &VertexId| v.index());
-        let along: Vec<[u32; 3]> = curve
-            .old_face
-            .par_iter()
-            .map(|&f| mesh.triangles[f as usize].map(|v| curve.new[v.index()]))
-            .collect();
-        let search = Self::along(search(&along, curve.old.len()), &along, |v: &u32| *v as usize);
+        let (curve, along) = Self::along(along_curve(mesh), &mesh.triangles, |v: &VertexId| v.0);
+        let (search, triangles) = Self::along(search(&along, curve.old.len()), &along, |v: &u32| *v);
         drop(along);
         // One after the other.
         let through = |outer: &[u32], inner: &[u32]| inner.par_iter().map(|&i| outer[i as usize]).collect();
-        Self {
+        let order = Self {
             old: through(&curve.old, &search.old),
             new: through(&search.new, &curve.new),
             old_face: through(&curve.old_face, &search.old_face),
-        }
+        };
+        let positions = order.old.par_iter().map(|&o| mesh.positions[o as usize]).collect();
+        let triangles = triangles.into_iter().map(|t| t.map(VertexId)).collect();
+        (order, TriangleMesh { positions, triangles })
     }
 
-    /// The numbering with these old vertices; faces in the order of their first ones.
-    fn along<T: Sync>(old: Vec<u32>, triangles: &[[T; 3]], index: impl Fn(&T) -> usize + Sync) -> Self {
-        let mut new = vec![0; old.len()];
-        for (n, &o) in old.iter().enumerate() {
-            new[o as usize] = n as u32;
-        }
+    /// The numbering with these old vertices, faces in the order of their first ones, and the triangles in it.
+    fn along<T: Sync>(
+        old: Vec<u32>,
+        triangles: &[[T; 3]],
+        number: impl Fn(&T) -> u32 + Sync,
+    ) -> (Self, Vec<[u32; 3]>) {
+        let new = inverse(&old);
+        let renumbered: Vec<[u32; 3]> =
+            triangles.par_iter().map(|[a, b, c]| [a, b, c].map(|v| new[number(v) as usize])).collect();
         // A counting sort: linear, and faces with the same first vertex keep their order.
-        let first: Vec<u32> =
-            triangles.par_iter().map(|t| t.iter().map(|v| new[index(v)]).min().unwrap_or(0)).collect();
+        let first = |&[a, b, c]: &[u32; 3]| a.min(b).min(c) as usize;
         let mut place = vec![0u32; old.len() + 1];
-        first.iter().for_each(|&v| place[v as usize + 1] += 1);
+        renumbered.iter().for_each(|t| place[first(t) + 1] += 1);
         for v in 1..place.len() {
             place[v] += place[v - 1];
         }
-        let mut old_face = vec![0; first.len()];
-        for (f, &v) in first.iter().enumerate() {
-            let slot = &mut place[v as usize];
+        let mut old_face = vec![0; renumbered.len()];
+        let mut sorted = vec![[0; 3]; renumbered.len()];
+        for (f, t) in renumbered.iter().enumerate() {
+            let slot = &mut place[first(t)];
             old_face[*slot as usize] = f as u32;
+            sorted[*slot as usize] = *t;
             *slot += 1;
         }
-        Self { old, new, old_face }
+        (Self { old, new, old_face }, sorted)
     }
 
     /// Values of the new vertices in the old order.
@@ -76,20 +79,15 @@ impl Order {
         self.new.par_iter().map(|&n| values[n as usize]).collect()
     }
 
-    /// The part in the new numbering, without the provenance of its vertices.
-    pub(crate) fn apply(&self, part: &Part) -> Part {
-        let mesh = &part.mesh;
-        let renumbered = |f: &u32| mesh.triangles[*f as usize].map(|v| VertexId(self.new[v.index()]));
+    /// The part in the new numbering, in which its mesh is `mesh`, without the provenance of its vertices.
+    pub(crate) fn apply(&self, part: &Part, mesh: TriangleMesh) -> Part {
         Part {
-            mesh: TriangleMesh {
-                positions: self.old.par_iter().map(|&o| mesh.positions[o as usize]).collect(),
-                triangles: self.old_face.par_iter().map(renumbered).collect(),
-            },
-            design: self.old_face.iter().map(|&f| part.design[f as usize]).collect(),
+            mesh,
+            design: gather(&part.design, &self.old_face),
             regions: part.regions.clone(),
-            region_of_face: self.old_face.iter().map(|&f| part.region_of_face[f as usize]).collect(),
+            region_of_face: gather(&part.region_of_face, &self.old_face),
             feature_edges: renumber_edges(&part.feature_edges, &self.new),
-            frozen: self.old.iter().map(|&o| part.frozen[o as usize]).collect(),
+            frozen: gather(&part.frozen, &self.old),
             provenance: Vec::new(),
             import: part.import.clone(),
             smoothing: None,
@@ -99,8 +97,10 @@ impl Order {
     /// What smoothing made of [`Self::apply`], in the numbering of the `original`.
     pub(crate) fn restore(&self, original: &Part, smoothed: Part) -> Part {
         let mut region_of_face = smoothed.region_of_face.clone();
-        for (&old, &region) in self.old_face.iter().zip(&smoothed.region_of_face) {
-            region_of_face[old as usize] = region;
+        if !is_uniform(&region_of_face) {
+            for (&old, &region) in self.old_face.iter().zip(&smoothed.region_of_face) {
+                region_of_face[old as usize] = region;
+            }
         }
         Part {
             mesh: TriangleMesh {
@@ -110,7 +110,7 @@ impl Order {
             design: original.design.clone(),
             region_of_face,
             feature_edges: renumber_edges(&smoothed.feature_edges, &self.old),
-            frozen: self.new.iter().map(|&n| smoothed.frozen[n as usize]).collect(),
+            frozen: gather(&smoothed.frozen, &self.new),
             provenance: original.provenance.clone(),
             ..smoothed
         }
@@ -147,44 +147,44 @@ fn along_curve(mesh: &TriangleMesh) -> Vec<u32> {
     keys.into_iter().map(|k| k.1).collect()
 }
 
-/// The vertices of triangles breadth first, from the lowest of each component.
+/// The values with these numbers. Mostly all are the same, and then nothing is looked up.
+fn gather<T: Copy + PartialEq + Send + Sync>(values: &[T], numbers: &[u32]) -> Vec<T> {
+    if is_uniform(values) {
+        values.to_vec()
+    } else {
+        numbers.par_iter().map(|&n| values[n as usize]).collect()
+    }
+}
+
+/// Whether all values are the same.
+fn is_uniform<T: PartialEq>(values: &[T]) -> bool {
+    values.windows(2).all(|pair| pair[0] == pair[1])
+}
+
+/// The vertices of triangles breadth first, from the lowest of each component, in strips by their number of neighbours.
 fn search(triangles: &[[u32; 3]], vertices: usize) -> Vec<u32> {
     let mut end = vec![0u32; vertices + 1];
     triangles.iter().flatten().for_each(|&v| end[v as usize + 1] += 1);
     for v in 0..vertices {
         end[v + 1] += end[v];
     }
-    let mut faces = vec![0u32; 3 * triangles.len()];
-    for (f, t) in triangles.iter().enumerate() {
-        for &v in t {
-            faces[end[v as usize] as usize] = f as u32;
-            end[v as usize] += 1;
+    // Of each corner the vertex that follows it: around a vertex inside these are all its neighbours, and along a border all are reached
+    // too, since a triangle can be walked round.
+    let mut following = vec![0u32; 3 * triangles.len()];
+    for t in triangles {
+        for k in 0..3 {
+            let slot = &mut end[t[k] as usize];
+            following[*slot as usize] = t[(k + 1) % 3];
+            *slot += 1;
         }
     }
     // After filling, the end of a list is the start of the next.
     let around = |v: u32| {
         let first = if v == 0 { 0 } else { end[v as usize - 1] };
-        &faces[first as usize..end[v as usize] as usize]
+        &following[first as usize..end[v as usize] as usize]
     };
-    let mut order = Vec::with_capacity(vertices);
-    let mut seen = vec![false; vertices];
-    for start in 0..vertices as u32 {
-        if std::mem::replace(&mut seen[start as usize], true) {
-            continue;
-        }
-        let mut next = order.len();
-        order.push(start);
-        while next < order.len() {
-            for &f in around(order[next]) {
-                for v in triangles[f as usize] {
-                    if !std::mem::replace(&mut seen[v as usize], true) {
-                        order.push(v);
-                    }
-                }
-            }
-            next += 1;
-        }
-    }
+    let mut order = breadth_first(vertices, around);
+    sort_strips(&mut order, |v| around(v).len());
     order
 }
 
@@ -220,8 +220,8 @@ mod tests {
         part.frozen[3] = true;
         part.feature_edges =
             vec![FeatureEdge { vertices: [VertexId(0), VertexId(2)], kind: FeatureKind::User }];
-        let order = Order::breadth_first(&part.mesh);
-        let inner = order.apply(&part);
+        let (order, mesh) = Order::breadth_first(&part.mesh);
+        let inner = order.apply(&part, mesh);
         assert_ne!(inner.mesh.positions, part.mesh.positions);
         // No vertex without a neighbour before it but the first.
         for v in 1..4 {

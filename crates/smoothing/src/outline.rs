@@ -30,6 +30,9 @@ impl OutlineGuard {
             slides[slide.vertex as usize] = true;
         }
         let mut faces = Vec::new();
+        if domain.slides.is_empty() {
+            return Self { faces, slides };
+        }
         for f in mesh.faces() {
             let vertices = mesh.triangles[f.index()].map(|v| v.index());
             let region = features.region_of_face[f.index()];

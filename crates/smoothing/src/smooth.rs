@@ -5,11 +5,15 @@ use crate::blocks::Blocks;
 use crate::features::{self, Features};
 use crate::finish::{Finish, Mended};
 use crate::kernel::{Change, Domain, Slide};
-use crate::locality::Order;
-use crate::methods::{self, Step};
+use crate::locality::{self, Order};
+use crate::methods::{self, State, Step, Terrain};
 use crate::outline::OutlineGuard;
+use crate::reorder::Reordered;
+use crate::rows::Rows;
+use crate::vector::convert;
 use crate::volume::{VolumeKeeper, six_volumes};
 use crate::{Method, Parameters, SmoothingError};
+use std::borrow::Cow;
 use topipe_mesh::{Connectivity, DVec3, Design, FeatureKind, Part, RegionId, SmoothingRecord, TriangleMesh};
 use topipe_progress::Progress;
 
@@ -49,16 +53,16 @@ pub(crate) fn smooth_observed(
         false => Order::of(mesh),
     };
     match order {
-        None => smooth_as_numbered(part, parameters, progress, observe),
-        Some(order) => {
-            let inner = order.apply(part);
+        None => smooth_as_numbered(Cow::Borrowed(part), parameters, progress, observe),
+        Some((order, renumbered)) => {
+            let inner = Cow::Owned(order.apply(part, renumbered));
             let smoothed = match observe {
-                None => smooth_as_numbered(&inner, parameters, progress, None),
+                None => smooth_as_numbered(inner, parameters, progress, None),
                 Some(observe) => {
                     let mut observe = |before: &[DVec3], after: &[DVec3], volume: f64| {
                         observe(&order.undo(before), &order.undo(after), volume)
                     };
-                    smooth_as_numbered(&inner, parameters, progress, Some(&mut observe))
+                    smooth_as_numbered(inner, parameters, progress, Some(&mut observe))
                 }
             };
             match smoothed {
@@ -74,7 +78,7 @@ pub(crate) fn smooth_observed(
 
 /// Smooths a part that has been checked, in its own numbering.
 fn smooth_as_numbered(
-    part: &Part,
+    part: Cow<'_, Part>,
     parameters: &Parameters,
     progress: &Progress,
     observe: Option<&mut Observer<'_>>,
@@ -89,32 +93,46 @@ fn smooth_as_numbered(
             if -parameters.mu < parameters.lambda { "shrink" } else { "grow" }
         ));
     }
-    let mut features = features::detect(part, &connectivity, parameters, progress)?;
+    let mut features = features::detect(&part, &connectivity, parameters, progress)?;
     let mut record =
         SmoothingRecord { method: parameters.method.name().to_owned(), ..SmoothingRecord::default() };
-    let frozen = frozen(part, parameters, &features);
+    let frozen = frozen(&part, parameters, &features);
     let positions = if parameters.most_iterations() == 0 {
         record.converged = true;
         mesh.positions.clone()
     } else {
         let domain = domain(&connectivity, &features, &frozen, mesh.vertex_count());
         iterate(
-            &Setup { part, connectivity: &connectivity, features: &features, domain: &domain },
+            &Setup { part: &part, connectivity: &connectivity, features: &features, domain: &domain },
             parameters,
             progress,
             &mut record,
             observe,
         )?
     };
-    let smoothed = TriangleMesh { positions, triangles: mesh.triangles.clone() };
-    let solid: Vec<bool> = mesh.triangles.iter().map(|t| t.iter().all(|v| frozen[v.index()])).collect();
-    features.measure(&smoothed);
+    let part = match part {
+        Cow::Owned(part) => Part { mesh: TriangleMesh { positions, ..part.mesh }, ..part },
+        Cow::Borrowed(part) => Part {
+            mesh: TriangleMesh { positions, triangles: part.mesh.triangles.clone() },
+            design: part.design.clone(),
+            regions: Vec::new(),
+            region_of_face: Vec::new(),
+            feature_edges: part.feature_edges.clone(),
+            frozen: Vec::new(),
+            provenance: part.provenance.clone(),
+            import: part.import.clone(),
+            smoothing: None,
+        },
+    };
+    let smoothed = &part.mesh;
+    let solid: Vec<bool> = smoothed.triangles.iter().map(|t| t.iter().all(|v| frozen[v.index()])).collect();
+    features.measure(smoothed);
     let mut feature_edges: Vec<_> =
         part.feature_edges.iter().filter(|e| e.kind == FeatureKind::User).copied().collect();
     // Between faces of which nothing is known no edge is a feature.
     let known = !features.regions.is_empty() || solid.contains(&true);
     let edges = if known {
-        features::feature_edges(&smoothed, &connectivity, &features, &solid, parameters)
+        features::feature_edges(smoothed, &connectivity, &features, &solid, parameters)
     } else {
         Vec::new()
     };
@@ -125,15 +143,12 @@ fn smooth_as_numbered(
     }
     feature_edges.sort_unstable_by_key(|e| e.vertices);
     Ok(Part {
-        mesh: smoothed,
-        design: part.design.clone(),
         regions: features.regions,
         region_of_face: features.region_of_face,
         feature_edges,
         frozen,
-        provenance: part.provenance.clone(),
-        import: part.import.clone(),
         smoothing: Some(record),
+        ..part
     })
 }
 
@@ -337,50 +352,49 @@ impl Run<'_> {
     }
 }
 
-/// Iterations of which several are made at once.
+/// Iterations between which nothing looks at the mesh.
 struct Journeys<'a> {
     setup: &'a Run<'a>,
-    blocks: &'a Blocks,
+    terrain: Terrain<'a>,
     tolerance: f64,
     most: u32,
 }
 
 impl Journeys<'_> {
-    /// Iterates until the step is small.
+    /// Iterates until the step is small, and returns the new positions.
     fn run(
         &self,
-        step: &mut dyn Step,
-        current: &mut Vec<DVec3>,
+        step: &dyn Step,
         progress: &Progress,
         record: &mut SmoothingRecord,
-    ) -> Result<(), SmoothingError> {
-        let Run { mesh, domain, .. } = *self.setup;
-        let at_once = step.most_at_once();
-        let mut journey = |current: &mut Vec<DVec3>, iterations| {
-            step.journey(self.blocks, domain, &mesh.positions, current, iterations)
-        };
+    ) -> Result<Vec<DVec3>, SmoothingError> {
+        let at_once = if self.terrain.blocks.is_some() { step.most_at_once() } else { 1 };
+        let mut state = State::of(self.terrain.original);
+        let journey = |state: &mut State, iterations| step.journey(&self.terrain, state, iterations);
         let mut done = 0;
         let mut before = Vec::new();
-        while done < self.most {
+        'iterations: while done < self.most {
             progress.check()?;
-            if self.tolerance > 0.0 {
-                before.clone_from(current);
+            if self.tolerance > 0.0 && at_once > 1 {
+                before.clone_from(&state.current);
             }
-            let changes = journey(current, at_once.min(self.most - done));
+            let changes = journey(&mut state, at_once.min(self.most - done));
             for (k, change) in (1..).zip(changes) {
                 let rms = self.setup.note(done + k, change, record)?;
                 if rms < self.tolerance {
-                    // Those that came after are taken back.
-                    current.clone_from(&before);
-                    journey(current, k);
+                    if at_once > 1 {
+                        // Those that came after are taken back.
+                        state.current.clone_from(&before);
+                        journey(&mut state, k);
+                    }
                     record.converged = true;
-                    return Ok(());
+                    break 'iterations;
                 }
             }
             done = record.iterations;
             progress.step(done.into(), self.most.into(), "iterations");
         }
-        Ok(())
+        Ok(convert(&state.current))
     }
 }
 
@@ -404,16 +418,34 @@ fn run(
         free: free - domain.slides.len(),
     };
     let mut step = methods::choose(parameters, domain, original);
-    let mut current = original.clone();
     let most = parameters.most_iterations();
     // Where nothing looks at the mesh between two iterations, several can be made at once.
     let nobody_looks = keeper.is_none() && domain.slides.is_empty() && observe.is_none();
-    if let Some(blocks) = (nobody_looks && step.most_at_once() > 0).then(|| Blocks::of(domain)).flatten() {
-        let journeys = Journeys { setup, blocks: &blocks, tolerance: parameters.tolerance, most };
-        journeys.run(step.as_mut(), &mut current, progress, record)?;
-        record.volumes.push(six_volumes(&mesh.triangles, center, &current) / 6.0);
-        return Ok(current);
+    if nobody_looks && step.most_at_once() > 0 {
+        // Larger parts have been renumbered as a whole.
+        let reordered =
+            (original.len() < locality::SMALL).then(|| Reordered::breadth_first(domain, original));
+        let (domain, original) = match &reordered {
+            Some(reordered) => (&reordered.domain, &reordered.positions),
+            None => (domain, original),
+        };
+        if let Some(rows) = Rows::of(domain) {
+            if reordered.is_some() {
+                step = methods::choose(parameters, domain, original);
+            }
+            let blocks = Blocks::of(&rows);
+            let terrain = Terrain { rows: &rows, blocks: blocks.as_ref(), original };
+            let journeys = Journeys { setup, terrain, tolerance: parameters.tolerance, most };
+            let current = journeys.run(step.as_ref(), progress, record)?;
+            let current = match &reordered {
+                Some(reordered) => reordered.undo(&current),
+                None => current,
+            };
+            record.volumes.push(six_volumes(&mesh.triangles, center, &current) / 6.0);
+            return Ok(current);
+        }
     }
+    let mut current = original.clone();
     let mut next = original.clone();
     for iteration in 1..=most {
         progress.check()?;

@@ -5,7 +5,7 @@
 
 use super::{Site, Stencil};
 use crate::Parameters;
-use topipe_mesh::DVec3;
+use crate::vector::Vector;
 
 pub(crate) struct Hc {
     pub(crate) alpha: f64,
@@ -18,12 +18,12 @@ impl Hc {
     }
 
     #[inline(always)]
-    fn anchor(&self, site: &Site<'_>, current: DVec3) -> DVec3 {
+    fn anchor<V: Vector, I>(&self, site: &Site<'_, V, I>, current: V) -> V {
         if self.alpha == 0.0 {
             // The input is not looked at: a quarter of what has to be read.
             current
         } else {
-            self.alpha * *site.original + (1.0 - self.alpha) * current
+            V::from(*site.original) * self.alpha + current * (1.0 - self.alpha)
         }
     }
 }
@@ -32,16 +32,16 @@ impl Stencil for Hc {
     const PASSES: usize = 2;
 
     #[inline(always)]
-    fn value(&self, stage: usize, site: &Site<'_>) -> DVec3 {
+    fn value<V: Vector, I: Copy + Into<u32>>(&self, stage: usize, site: &Site<'_, V, I>) -> V {
         if stage == 0 {
             site.mean() - self.anchor(site, site.here)
         } else {
             // p is not stored: it is the difference plus the anchor.
-            self.anchor(site, site.before) + (1.0 - self.beta) * (site.here - site.mean())
+            self.anchor(site, site.before) + (site.here - site.mean()) * (1.0 - self.beta)
         }
     }
 
-    fn at_rest(&self, _: DVec3) -> DVec3 {
-        DVec3::ZERO
+    fn at_rest<V: Vector>(&self, _: V) -> V {
+        V::default()
     }
 }

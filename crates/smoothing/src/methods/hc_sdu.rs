@@ -13,6 +13,7 @@
 
 use super::{Site, Stencil};
 use crate::kernel::{Domain, scale_dependent};
+use crate::vector::Vector;
 use crate::{Parameters, Weights};
 use topipe_mesh::DVec3;
 
@@ -44,20 +45,21 @@ impl Stencil for HcSdu {
     const PASSES: usize = 2;
 
     #[inline(always)]
-    fn value(&self, stage: usize, site: &Site<'_>) -> DVec3 {
+    fn value<V: Vector, I: Copy + Into<u32>>(&self, stage: usize, site: &Site<'_, V, I>) -> V {
         let half_alpha = self.alpha / 2.0;
         if stage == 0 {
             // diff = (s - c) + alpha/2 (c - o), written in differences only.
-            self.lambda * site.weighted_umbrella(&self.weights) + half_alpha * (site.here - *site.original)
+            site.weighted_umbrella(&self.weights) * self.lambda
+                + (site.here - V::from(*site.original)) * half_alpha
         } else {
             // s is not stored: s = c + diff - alpha/2 (c - o).
-            site.before - half_alpha * (site.before - *site.original)
-                + (1.0 - self.beta) * (site.here - site.mean())
+            site.before - (site.before - V::from(*site.original)) * half_alpha
+                + (site.here - site.mean()) * (1.0 - self.beta)
         }
     }
 
-    fn at_rest(&self, _: DVec3) -> DVec3 {
-        DVec3::ZERO
+    fn at_rest<V: Vector>(&self, _: V) -> V {
+        V::default()
     }
 
     fn prepare(&mut self, domain: &Domain, current: &[DVec3]) {

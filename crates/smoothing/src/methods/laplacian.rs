@@ -8,7 +8,7 @@
 //! mesh is less centred than one from the part itself (0.0215 against 0.0120 in that thesis).
 
 use super::{Site, Stencil};
-use topipe_mesh::DVec3;
+use crate::vector::Vector;
 
 pub(crate) struct Laplacian {
     pub(crate) lambda: f64,
@@ -18,11 +18,11 @@ impl Stencil for Laplacian {
     const PASSES: usize = 1;
 
     #[inline(always)]
-    fn value(&self, _: usize, site: &Site<'_>) -> DVec3 {
-        site.here + self.lambda * site.umbrella()
+    fn value<V: Vector, I: Copy + Into<u32>>(&self, _: usize, site: &Site<'_, V, I>) -> V {
+        site.here + site.umbrella() * self.lambda
     }
 
-    fn at_rest(&self, here: DVec3) -> DVec3 {
+    fn at_rest<V: Vector>(&self, here: V) -> V {
         here
     }
 }

@@ -11,6 +11,8 @@ pub(crate) use {hc::Hc, laplacian::Laplacian, taubin::Taubin};
 
 use crate::blocks::Blocks;
 use crate::kernel::{Change, Domain, View, in_chunks_mut};
+use crate::rows::{self, Rows};
+use crate::vector::{Padded, Vector};
 use crate::{Method, Parameters};
 use topipe_mesh::DVec3;
 
@@ -26,10 +28,10 @@ pub(crate) trait Stencil: Sync {
     const PASSES: usize;
 
     /// The value of a vertex that may move after pass `stage`.
-    fn value(&self, stage: usize, site: &Site<'_>) -> DVec3;
+    fn value<V: Vector, I: Copy + Into<u32>>(&self, stage: usize, site: &Site<'_, V, I>) -> V;
 
     /// The intermediate value of a vertex that stays where it is.
-    fn at_rest(&self, here: DVec3) -> DVec3;
+    fn at_rest<V: Vector>(&self, here: V) -> V;
 
     /// Called before each iteration; says whether the method may change then and so has to be asked each time.
     fn prepare(&mut self, _: &Domain, _: &[DVec3]) {}
@@ -41,109 +43,94 @@ pub(crate) trait Stencil: Sync {
 }
 
 /// A vertex in a pass.
-pub(crate) struct Site<'a> {
+pub(crate) struct Site<'a, V, I> {
     /// The vertices that pull on it.
-    pub(crate) row: &'a [u32],
+    pub(crate) row: &'a [I],
     /// The place of the row in [`Domain::neighbors`].
     pub(crate) first: usize,
     /// What the pass reads.
-    pub(crate) read: View<'a>,
+    pub(crate) read: View<'a, V>,
     /// Its own value there.
-    pub(crate) here: DVec3,
+    pub(crate) here: V,
     /// Its value in what the pass writes: in the second of two its position before.
-    pub(crate) before: DVec3,
+    pub(crate) before: V,
     /// Its position before the first iteration.
     pub(crate) original: &'a DVec3,
 }
 
-impl Site<'_> {
+impl<V: Vector, I: Copy + Into<u32>> Site<'_, V, I> {
     /// The mean of the neighbours.
     #[inline(always)]
-    fn mean(&self) -> DVec3 {
+    fn mean(&self) -> V {
         self.read.mean(self.row)
     }
 
     /// The mean of the neighbours less the vertex.
     #[inline(always)]
-    fn umbrella(&self) -> DVec3 {
+    fn umbrella(&self) -> V {
         self.mean() - self.here
     }
 
     /// The weighted mean of the neighbours less the vertex; the weights of a row add up to 1.
     #[inline(always)]
-    fn weighted_umbrella(&self, weights: &[f64]) -> DVec3 {
+    fn weighted_umbrella(&self, weights: &[f64]) -> V {
         let weights = &weights[self.first..self.first + self.row.len()];
         self.row
             .iter()
             .zip(weights)
-            .fold(DVec3::ZERO, |sum, (&j, &w)| sum + w * (*self.read.at(j as usize) - self.here))
+            .fold(V::default(), |sum, (&j, &w)| sum + (self.read.at(j) - self.here) * w)
     }
 }
 
-/// What a pass works on: the vertices from `from` on.
-pub(crate) struct Pass<'a> {
-    pub(crate) domain: &'a Domain,
+/// What a pass works on.
+struct Pass<'a> {
+    domain: &'a Domain,
     /// Positions before the first iteration.
-    pub(crate) original: &'a [DVec3],
+    original: &'a [DVec3],
     /// What the pass before wrote.
-    pub(crate) read: View<'a>,
-    pub(crate) from: usize,
-    /// In the second of two passes the positions before the iteration, where they are not in what is written.
-    pub(crate) before: Option<&'a [DVec3]>,
-}
-
-/// One pass over the vertices whose values are `write`; returns how far they moved, if the pass is the last of an iteration.
-pub(crate) fn sweep<S: Stencil>(stencil: &S, stage: usize, pass: &Pass<'_>, write: &mut [DVec3]) -> Change {
-    // A loop for each stage: what the other one reads is not looked at.
-    match (stage, pass.before) {
-        (0, _) => sweep_stage::<S, 0, false>(stencil, pass, &[], write),
-        (_, None) => sweep_stage::<S, 1, false>(stencil, pass, &[], write),
-        (_, Some(before)) => sweep_stage::<S, 1, true>(stencil, pass, &before[pass.from..], write),
-    }
+    read: &'a [DVec3],
+    /// In the second of two passes the positions before the iteration.
+    before: &'a [DVec3],
 }
 
 /// Vertices between two sums of steps.
 const STRIP: usize = 64;
 
-fn sweep_stage<S: Stencil, const STAGE: usize, const APART: bool>(
+/// A pass over the vertices from `from` on, whose values are `write`; returns how far they moved, if the pass is the last of an iteration.
+fn sweep<S: Stencil, const STAGE: usize>(
     stencil: &S,
     pass: &Pass<'_>,
-    before: &[DVec3],
+    from: usize,
     write: &mut [DVec3],
 ) -> Change {
-    let Pass { domain, original, read, from, .. } = *pass;
+    let Pass { domain, original, read, before } = *pass;
     let last = STAGE + 1 == S::PASSES;
     let mut change = Change::default();
     let mut begin = domain.start[from] as usize;
-    // Coordinates apart: their squares are taken several at a time.
-    let mut steps = [[0.0; STRIP]; 3];
+    let mut steps = [DVec3::ZERO; STRIP];
     for (strip, write) in write.chunks_mut(STRIP).enumerate() {
         let from = from + strip * STRIP;
         let (ends, original) = (&domain.start[from + 1..], &original[from..]);
-        let here = &read.values[from - read.first..];
-        let before = if APART { &before[strip * STRIP..] } else { before };
-        steps.iter_mut().for_each(|s| s[write.len()..].fill(0.0));
+        // A loop for each stage: what the other one reads is not looked at.
+        let (here, before) = (&read[from..], if STAGE == 0 { before } else { &before[from..] });
+        steps[write.len()..].fill(DVec3::ZERO);
         for (i, slot) in write.iter_mut().enumerate() {
             let end = ends[i] as usize;
             let here = here[i];
-            let before = if APART { before[i] } else { *slot };
-            let after = if begin < end {
+            let before = if STAGE == 0 { here } else { before[i] };
+            *slot = if begin < end {
                 let row = &domain.neighbors[begin..end];
+                let read = View::whole(read);
                 let site = Site { row, first: begin, read, here, before, original: &original[i] };
                 stencil.value(STAGE, &site)
-            } else if S::PASSES == 1 {
-                here
             } else if last {
                 before
             } else {
                 stencil.at_rest(here)
             };
-            *slot = after;
             if last {
-                let step = after - if S::PASSES == 1 { here } else { before };
                 // The remainder spares a comparison.
-                let i = i % STRIP;
-                (steps[0][i], steps[1][i], steps[2][i]) = (step.x, step.y, step.z);
+                steps[i % STRIP] = *slot - before;
             }
             begin = end;
         }
@@ -163,14 +150,31 @@ pub(crate) trait Step {
     fn most_at_once(&self) -> u32;
 
     /// Makes so many iterations at once, and returns the change of each.
-    fn journey(
-        &mut self,
-        blocks: &Blocks,
-        domain: &Domain,
-        original: &[DVec3],
-        current: &mut Vec<DVec3>,
-        iterations: u32,
-    ) -> Vec<Change>;
+    fn journey(&self, terrain: &Terrain<'_>, state: &mut State, iterations: u32) -> Vec<Change>;
+}
+
+/// What a journey goes through.
+#[derive(Clone, Copy)]
+pub(crate) struct Terrain<'a> {
+    pub(crate) rows: &'a Rows,
+    /// Where the mesh is large enough for several iterations at once.
+    pub(crate) blocks: Option<&'a Blocks>,
+    /// Positions before the first iteration.
+    pub(crate) original: &'a [DVec3],
+}
+
+/// The vertices between two journeys.
+pub(crate) struct State {
+    pub(crate) current: Vec<Padded>,
+    /// What the passes write in turns with the first.
+    other: Vec<Padded>,
+}
+
+impl State {
+    /// Vertices that have not moved.
+    pub(crate) fn of(positions: &[DVec3]) -> Self {
+        Self { current: Padded::all(positions), other: vec![Padded::default(); positions.len()] }
+    }
 }
 
 /// A method with the memory that it needs.
@@ -184,41 +188,45 @@ impl<S: Stencil> Step for Stepper<S> {
     fn step(&mut self, domain: &Domain, original: &[DVec3], current: &[DVec3], next: &mut [DVec3]) -> Change {
         self.stencil.prepare(domain, current);
         let stencil = &self.stencil;
-        let pass = |stage, read: &[DVec3], write: &mut [DVec3], before: Option<&[DVec3]>| {
-            Change::sum(&in_chunks_mut(write, |from, chunk| {
-                sweep(
-                    stencil,
-                    stage,
-                    &Pass { domain, original, read: View::whole(read), from, before },
-                    chunk,
-                )
-            }))
-        };
         if S::PASSES == 1 {
-            return pass(0, current, next, None);
+            let pass = Pass { domain, original, read: current, before: &[] };
+            return Change::sum(&in_chunks_mut(next, |from, chunk| {
+                sweep::<S, 0>(stencil, &pass, from, chunk)
+            }));
         }
         self.between.resize(current.len(), DVec3::ZERO);
-        pass(0, current, &mut self.between, None);
-        pass(1, &self.between, next, Some(current))
+        let pass = Pass { domain, original, read: current, before: &[] };
+        in_chunks_mut(&mut self.between, |from, chunk| sweep::<S, 0>(stencil, &pass, from, chunk));
+        let pass = Pass { domain, original, read: &self.between, before: current };
+        Change::sum(&in_chunks_mut(next, |from, chunk| sweep::<S, 1>(stencil, &pass, from, chunk)))
     }
 
     fn most_at_once(&self) -> u32 {
         if self.stencil.changes() { 0 } else { (Blocks::most_passes() / S::PASSES) as u32 }
     }
 
-    fn journey(
-        &mut self,
-        blocks: &Blocks,
-        domain: &Domain,
-        original: &[DVec3],
-        current: &mut Vec<DVec3>,
-        iterations: u32,
-    ) -> Vec<Change> {
-        self.between.resize(current.len(), DVec3::ZERO);
+    fn journey(&self, terrain: &Terrain<'_>, state: &mut State, iterations: u32) -> Vec<Change> {
+        let Terrain { rows, blocks, original } = *terrain;
         let passes = iterations as usize * S::PASSES;
-        let changes = blocks.sweep(&self.stencil, domain, original, (current, &mut self.between), passes);
-        if passes % 2 == 1 {
-            std::mem::swap(current, &mut self.between);
+        let mut changes = Vec::with_capacity(iterations as usize);
+        if let Some(blocks) = blocks {
+            let arrays = (state.current.as_mut_slice(), state.other.as_mut_slice());
+            changes = blocks.sweep(&self.stencil, rows, original, arrays, passes);
+            if passes % 2 == 1 {
+                std::mem::swap(&mut state.current, &mut state.other);
+            }
+            return changes;
+        }
+        for pass in 0..passes {
+            let stage = pass % S::PASSES;
+            let read = View::whole(&state.current);
+            let change = Change::sum(&in_chunks_mut(&mut state.other, |from, chunk| {
+                rows::sweep(&self.stencil, stage, &rows::Pass { rows, original, read, from }, chunk)
+            }));
+            std::mem::swap(&mut state.current, &mut state.other);
+            if stage + 1 == S::PASSES {
+                changes.push(change);
+            }
         }
         changes
     }

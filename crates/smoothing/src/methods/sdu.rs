@@ -5,6 +5,7 @@
 
 use super::{Site, Stencil};
 use crate::kernel::{Domain, scale_dependent};
+use crate::vector::Vector;
 use crate::{Parameters, Weights};
 use topipe_mesh::DVec3;
 
@@ -32,11 +33,11 @@ impl Stencil for Sdu {
     const PASSES: usize = 1;
 
     #[inline(always)]
-    fn value(&self, _: usize, site: &Site<'_>) -> DVec3 {
-        site.here + self.lambda * site.weighted_umbrella(&self.weights)
+    fn value<V: Vector, I: Copy + Into<u32>>(&self, _: usize, site: &Site<'_, V, I>) -> V {
+        site.here + site.weighted_umbrella(&self.weights) * self.lambda
     }
 
-    fn at_rest(&self, here: DVec3) -> DVec3 {
+    fn at_rest<V: Vector>(&self, here: V) -> V {
         here
     }
 

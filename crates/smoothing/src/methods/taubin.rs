@@ -6,7 +6,7 @@
 //! (-23 % after 68 iterations on a noisy beam).
 
 use super::{Site, Stencil};
-use topipe_mesh::DVec3;
+use crate::vector::Vector;
 
 pub(crate) struct Taubin {
     pub(crate) lambda: f64,
@@ -17,11 +17,11 @@ impl Stencil for Taubin {
     const PASSES: usize = 2;
 
     #[inline(always)]
-    fn value(&self, stage: usize, site: &Site<'_>) -> DVec3 {
-        site.here + if stage == 0 { self.lambda } else { self.mu } * site.umbrella()
+    fn value<V: Vector, I: Copy + Into<u32>>(&self, stage: usize, site: &Site<'_, V, I>) -> V {
+        site.here + site.umbrella() * if stage == 0 { self.lambda } else { self.mu }
     }
 
-    fn at_rest(&self, here: DVec3) -> DVec3 {
+    fn at_rest<V: Vector>(&self, here: V) -> V {
         here
     }
 }
