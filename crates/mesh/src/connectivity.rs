@@ -102,6 +102,8 @@ impl Connectivity {
         let half_edges = mesh.face_count() * 3;
         check_triangles(mesh)?;
         let origin = mesh.triangles.as_flattened().to_vec();
+        // What stays comes before what does not: so the memory of the second is whole again afterwards.
+        let mut twin = vec![HalfEdgeId::NONE; half_edges];
         let mut outgoing = vec![HalfEdgeId::NONE; vertex_count];
         let mut degree = vec![0u32; vertex_count];
         let mut start = vec![0u32; vertex_count + 1];
@@ -139,7 +141,6 @@ impl Connectivity {
         }
         let high = |entry: &u64| (entry >> 32) as u32;
         let half_edge = |entry: &u64| HalfEdgeId(*entry as u32);
-        let mut twin = vec![HalfEdgeId::NONE; half_edges];
         let mut matched = 0;
         for v in 0..vertex_count {
             let middle = free[v][0] as usize;

