@@ -32,6 +32,16 @@ pub(crate) fn control(points: &[DVec3], slopes: &[DVec3]) -> Vec<DVec3> {
     control
 }
 
+/// The curve with the points and slopes of another at the ends of `spans` spans, where that has more; else itself.
+pub(crate) fn coarsened(curve: &[DVec3], spans: usize) -> Vec<DVec3> {
+    if spans >= curve.len() / 2 - 1 {
+        return curve.to_vec();
+    }
+    let ends = (0..=spans).map(|k| derivatives(curve, k as f64 / spans as f64));
+    let (points, slopes): (Vec<DVec3>, Vec<DVec3>) = ends.map(|[point, slope, _]| (point, slope)).unzip();
+    control(&points, &slopes)
+}
+
 /// The four functions of [`basis`] that are not zero at `t` in [0, 1]: index of the first, values, first derivatives.
 /// The same as [`Basis::evaluate`] gives, several times faster.
 pub(crate) fn local(spans: usize, t: f64) -> (usize, [f64; 4], [f64; 4]) {

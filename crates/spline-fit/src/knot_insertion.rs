@@ -47,10 +47,16 @@ pub(crate) fn insert_knots(
     let layout = setting.layout;
     let spans = |e: usize| {
         let beside = setting.beside[e].iter().map(|&(q, side)| fitted[q as usize].spans(side as usize));
-        Breaks::uniform(beside.min().unwrap_or(1))
+        Breaks::uniform(beside.min().unwrap_or(1).max(curves[e].spans()))
     };
     let mut breaks: Vec<Breaks> = (0..layout.edges.len()).map(spans).collect();
-    let mut nets: Vec<Net> = fitted.iter().map(|f| f.net.clone()).collect();
+    // Sides were fitted with fewer spans than their curves where these have many.
+    let nets = fitted.par_iter().enumerate().map(|(q, fitted)| {
+        let sides = layout.quads[q].iter().enumerate();
+        let coarse = sides.into_iter().any(|(k, side)| curves[side.edge as usize].spans() > fitted.spans(k));
+        if coarse { with_knots(setting, curves, fitted, q, &breaks) } else { fitted.net.clone() }
+    });
+    let mut nets: Vec<Net> = nets.collect();
     let mut dirty: Vec<bool> = vec![true; layout.edges.len()];
     let mut inserted = 0;
     let mut angles = vec![0.0f64; layout.edges.len()];

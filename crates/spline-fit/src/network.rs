@@ -18,6 +18,13 @@ pub(crate) struct Curve {
     pub(crate) normals: Option<Vec<DVec3>>,
 }
 
+impl Curve {
+    /// Number of spans.
+    pub(crate) fn spans(&self) -> usize {
+        self.control.len() / 2 - 1
+    }
+}
+
 /// Vertices and edges.
 pub(crate) struct Network {
     pub(crate) frames: Frames,

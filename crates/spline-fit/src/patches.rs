@@ -127,9 +127,14 @@ pub(crate) fn grams<'a>(borders: impl Iterator<Item = &'a [Border; 4]>) -> Vec<G
     (0..=most.ilog2()).map(|k| Gram::new(&hermite::basis(1 << k))).collect()
 }
 
+/// Most spans of a side while the inside of a patch is fitted. The border of a ragged region has up to 64; a patch with two such
+/// sides has 17,000 unknowns, and one of them took as long as all other patches of the support. What the side itself needs comes back
+/// with the knots that are inserted at the end.
+const MOST_SPANS: usize = 16;
+
 /// Spans along the side of a patch.
 fn side_spans(curve: &Curve, spans: usize) -> usize {
-    (curve.control.len() / 2 - 1).max(spans)
+    curve.spans().min(MOST_SPANS).max(spans)
 }
 
 /// Factors on the bending energy with which a patch is tried until it is nowhere turned over.
@@ -232,7 +237,7 @@ fn borders_of(setting: &Setting<'_>, quad: usize, curves: &[Curve], spans: &[usi
     let sides = [0, 1, 2, 3].map(|k| side_of(setting, quad, k, curves, &breaks[k]));
     let mut ribbons = ribbons(&sides);
     [0, 1, 2, 3].map(|k| {
-        let mut control = sides[k].control.to_vec();
+        let mut control = hermite::coarsened(sides[k].control, spans[k]);
         if sides[k].reversed {
             control.reverse();
         }

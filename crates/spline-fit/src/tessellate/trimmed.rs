@@ -160,23 +160,7 @@ fn polygons(
     if turn_a + turn_b != 0.0 || turn_a.abs() != 1.0 {
         return None;
     }
-    // Where to cut: the pair of vertices most nearly on one ruling.
-    let angle = |x: f64| (x / period).rem_euclid(1.0);
-    let mut order: Vec<usize> = (0..b.len()).collect();
-    order.sort_by(|&i, &j| angle(b[i].at[0]).total_cmp(&angle(b[j].at[0])));
-    let mut best = (f64::INFINITY, 0, 0);
-    for (i, corner) in a.iter().enumerate() {
-        let wanted = angle(corner.at[0]);
-        let k = order.partition_point(|&j| angle(b[j].at[0]) < wanted);
-        for j in [order[k % order.len()], order[(k + order.len() - 1) % order.len()]] {
-            let off = angle(b[j].at[0]) - wanted;
-            let off = (off - off.round()).abs();
-            if off < best.0 {
-                best = (off, i, j);
-            }
-        }
-    }
-    let (_, i, j) = best;
+    let (i, j) = cut(a, b, &around, &closed, period);
     // Each border from the cut once around to it again, unrolled from `start`.
     let unrolled = |corners: &[Corner], first: usize, turn: f64, start: Option<Place>| -> Vec<Corner> {
         let n = corners.len();
@@ -202,6 +186,52 @@ fn polygons(
     }
     closed.insert(0, polygon);
     Some(closed)
+}
+
+/// Where to cut: the corners of two borders around a cylinder most nearly on one ruling between which no border lies. A ragged
+/// border can reach over itself; where it does everywhere, the pair nearest in angle.
+fn cut(
+    a: &[Corner],
+    b: &[Corner],
+    around: &[(Vec<Corner>, f64)],
+    closed: &[Vec<Corner>],
+    period: f64,
+) -> (usize, usize) {
+    let angle = |x: f64| (x / period).rem_euclid(1.0);
+    let mut order: Vec<usize> = (0..b.len()).collect();
+    order.sort_by(|&i, &j| angle(b[i].at[0]).total_cmp(&angle(b[j].at[0])));
+    let mut pairs: Vec<(f64, usize, usize)> = Vec::with_capacity(2 * a.len());
+    for (i, corner) in a.iter().enumerate() {
+        let wanted = angle(corner.at[0]);
+        let k = order.partition_point(|&j| angle(b[j].at[0]) < wanted);
+        for j in [order[k % order.len()], order[(k + order.len() - 1) % order.len()]] {
+            let off = angle(b[j].at[0]) - wanted;
+            pairs.push(((off - off.round()).abs(), i, j));
+        }
+    }
+    pairs.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
+    let borders = || around.iter().map(|(corners, _)| corners).chain(closed);
+    let is_free = |&&(_, i, j): &&(f64, usize, usize)| {
+        let from = a[i].at;
+        let to = [b[j].at[0] + period * ((from[0] - b[j].at[0]) / period).round(), b[j].at[1]];
+        borders().all(|corners| {
+            (0..corners.len()).all(|k| {
+                let (p, q) = (corners[k], corners[(k + 1) % corners.len()]);
+                let ends = [a[i].vertex, b[j].vertex];
+                let start = [p.at[0] + period * ((from[0] - p.at[0]) / period).round(), p.at[1]];
+                let end = [q.at[0] + period * ((start[0] - q.at[0]) / period).round(), q.at[1]];
+                ends.contains(&p.vertex) || ends.contains(&q.vertex) || !meet([from, to], [start, end])
+            })
+        })
+    };
+    let best = pairs.iter().find(is_free).or(pairs.first());
+    best.map_or((0, 0), |&(_, i, j)| (i, j))
+}
+
+/// Whether two segments touch or cross.
+fn meet([a, b]: [Place; 2], [c, d]: [Place; 2]) -> bool {
+    let turn = |p: Place, q: Place, r: Place| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+    turn(a, b, c) * turn(a, b, d) <= 0.0 && turn(c, d, a) * turn(c, d, b) <= 0.0
 }
 
 type Faces = ConstrainedDelaunayTriangulation<Corner>;

@@ -49,7 +49,10 @@ impl Construction<'_> {
                             Fault::Pinch(v) => self.part(tile, v),
                             Fault::NotDisk => false,
                         };
-                        if parted || self.bisect(tile, &faces, &is_corner, &mut stamps) {
+                        if parted
+                            || (round >= JOIN_ROUNDS && self.separate(tile, &faces))
+                            || self.bisect(tile, &faces, &is_corner, &mut stamps)
+                        {
                             changes += 1;
                             self.mark_neighbors(&faces, &mut busy);
                         } else {
@@ -138,6 +141,26 @@ impl Construction<'_> {
             run(first).into_iter().map(|f| (0, f)).chain(run(second).into_iter().map(|f| (1, f))).collect();
         self.take(tile, &seeds);
         true
+    }
+
+    /// Makes each connected part of a tile a tile of its own, all at once: a strip along a ragged border of a fine mesh can have
+    /// dozens, of which [`Self::bisect`] cuts off one a round. False where there is one part only.
+    fn separate(&mut self, tile: u32, faces: &[FaceId]) -> bool {
+        let mut reached = self.within(tile, &[(0, faces[0])]);
+        let whole = reached.len() == faces.len();
+        for &face in faces {
+            if !reached.contains_key(&face) {
+                let part = self.within(tile, &[(0, face)]);
+                let number = self.seeds.len() as u32;
+                self.seeds.push(Seed::Piece);
+                for (&f, &(distance, _)) in &part {
+                    self.surface.owner[f.index()] = number;
+                    self.surface.distance[f.index()] = distance;
+                }
+                reached.extend(part);
+            }
+        }
+        !whole
     }
 
     /// Cuts a tile in two; false where it is a single face.
