@@ -49,10 +49,10 @@ pub enum SmoothingError {
     /// The triangles are not an oriented manifold.
     #[error("the mesh is not an oriented manifold: {0}; import repairs or refuses such meshes")]
     Connectivity(#[from] ConnectivityError),
-    /// No vertex may move.
+    /// No vertex may move, but for those that slide in detected planes while the volume is to be kept.
     #[error(
         "all {vertices} vertices are frozen ({non_design} by non-design labels, the others by detected planes and \
-         holes or by the part itself), so there is nothing to smooth; set `freeze_non_design`, `detect_planes` or \
+         holes, in which they could only slide, or by the part itself), so there is nothing to smooth; set `freeze_non_design`, `detect_planes` or \
          `detect_holes` to false, or `iterations` to 0"
     )]
     EverythingFrozen {

@@ -265,7 +265,8 @@ fn iterate(
     let mesh = &part.mesh;
     let original = &mesh.positions;
     let free = domain.free_count();
-    if free == 0 {
+    // Vertices that slide in their planes change the volume, and none is free to restore it.
+    if free == 0 || (parameters.keeps_volume() && free == domain.slides.len()) {
         let mut labelled = vec![false; mesh.vertex_count()];
         for (t, design) in mesh.triangles.iter().zip(&part.design) {
             if parameters.freeze_non_design && *design == Design::NonDesign {

@@ -67,6 +67,22 @@ fn everything_frozen_is_refused_unless_nothing_is_to_be_done() {
         refused(&block, &Parameters::default()),
         SmoothingError::EverythingFrozen { non_design: 0, .. }
     ));
+
+    // Of a block with a step of one voxel askew, the vertices along the step slide in its flat faces, and none is free.
+    let step = |p: DVec3| if p.x + 2.0 * p.y > 0.0 { 1.0 } else { 0.0 };
+    let stepped = Part::new(voxels(9, |p| p.x.abs().max(p.y.abs()) < 8.0 && p.z > -6.0 && p.z < step(p)));
+    assert!(matches!(
+        refused(&stepped, &Parameters::default()),
+        SmoothingError::EverythingFrozen { non_design: 0, .. }
+    ));
+    assert!(
+        smooth(
+            &stepped,
+            &Parameters { preserve_volume: Some(false), ..Parameters::default() },
+            &Progress::silent()
+        )
+        .is_ok()
+    );
 }
 
 #[test]
