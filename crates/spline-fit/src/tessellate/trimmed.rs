@@ -316,3 +316,37 @@ fn divide(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The wall between a circle and a border that reaches over itself where both have a corner on the same ruling.
+    #[test]
+    fn a_wall_is_cut_where_no_border_lies_between() {
+        let quarter = TAU / 4.0;
+        let circle: Vec<Place> = (0..4).map(|k| [quarter * f64::from(k), 0.0]).collect();
+        // Clockwise seen from outside, with a fold below the corner at a quarter of a turn.
+        let folded = [[5.0, 2.0], [4.0, 2.0], [2.5, 2.0], [quarter, 2.0], [quarter + 0.3, 1.5]]
+            .into_iter()
+            .chain([[quarter - 0.3, 1.0], [0.4, 2.0]]);
+        let folded: Vec<Place> = folded.collect();
+        let corners = |places: &[Place], first: usize| -> Vec<Corner> {
+            let at = places.iter().enumerate();
+            at.map(|(k, &at)| Corner { at, vertex: VertexId::new(first + k) }).collect()
+        };
+        let around = [(corners(&circle, 0), 1.0), (corners(&folded, 4), -1.0)];
+        let (i, j) = cut(&around[0].0, &around[1].0, &around, &[], TAU);
+        assert_ne!((i, j), (1, 3), "the fold lies between");
+
+        let shape = RegionShape::Cylinder { point: DVec3::ZERO, axis: DVec3::Z, radius: 1.0, hole: false };
+        let development = Development::new(&shape);
+        let positions: Vec<[f64; 3]> =
+            circle.iter().chain(&folded).map(|&at| development.position(at).to_array()).collect();
+        let mut mesh = TriangleMesh::from_arrays(positions, Vec::new());
+        let loops = [(0..4).map(VertexId::new).collect(), (4..11).map(VertexId::new).collect()];
+        assert!(add(&mut mesh, &shape, &loops, f64::INFINITY, f64::INFINITY));
+        // A ring without inner vertices has as many triangles as corners.
+        assert_eq!(mesh.triangles.len(), 11);
+    }
+}
