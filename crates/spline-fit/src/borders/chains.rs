@@ -14,7 +14,7 @@ pub(super) struct Chain {
 }
 
 /// A border turns a corner where its directions before and after, each over a length of this many edges of the mesh, differ
-/// by more than `CORNER_ANGLE` degrees. Shorter and smaller turns are the teeth of the mesh.
+/// by more than `CORNER_ANGLE` degrees. Shorter and smaller turns are the teeth of the mesh, unless a quad has its corner there.
 const CORNER_REACH: f64 = 3.0;
 const CORNER_ANGLE: f64 = 60.0;
 
@@ -38,6 +38,16 @@ pub(super) fn chains(
             }
         }
     }
+    // One quad lies in the corner there: a curve without a kink would leave it an angle of 180 degrees.
+    let mut cornered = vec![false; layout.vertices.len()];
+    for quad in &layout.quads {
+        for k in 0..4 {
+            let on_border = |side: Side| sides[side.edge as usize].iter().any(Option::is_some);
+            if on_border(quad[k]) && on_border(quad[(k + 3) % 4]) {
+                cornered[layout.start(quad[k]) as usize] = true;
+            }
+        }
+    }
     let reach = CORNER_REACH * grain;
     let mut done = vec![false; layout.edges.len()];
     let mut chains = Vec::new();
@@ -54,6 +64,7 @@ pub(super) fn chains(
                 let before = (k + n - 1) % n;
                 regions[v].len() > 1
                     || leaving[v] > 1
+                    || cornered[v]
                     || !open(before)
                     || turns(layout, around[before], around[k % n], reach)
             };
