@@ -150,6 +150,21 @@ mod tests {
     use crate::{CurveShape, EdgeCurve};
 
     #[test]
+    fn fewer_spans_keep_a_cubic_and_the_points_of_any_curve() {
+        let cubic = |t: f64| [DVec3::new(t, t * t, t * t * t), DVec3::new(1.0, 2.0 * t, 3.0 * t * t)];
+        let (points, slopes): (Vec<DVec3>, Vec<DVec3>) =
+            (0..=8).map(|k| cubic(f64::from(k) / 8.0).into()).unzip();
+        let curve = control(&points, &slopes);
+        assert_eq!(coarsened(&curve, 8), curve);
+        let coarse = coarsened(&curve, 2);
+        assert_eq!(coarse.len(), 6);
+        for k in 0..=20 {
+            let t = f64::from(k) / 20.0;
+            assert!(derivatives(&coarse, t)[0].distance(cubic(t)[0]) < 1e-14);
+        }
+    }
+
+    #[test]
     fn an_arc_stays_within_its_tolerance() {
         let axis = DVec3::new(1.0, 2.0, -0.5).normalize();
         let circle = Circle::about(DVec3::new(3.0, -1.0, 7.0), axis, 9.0);

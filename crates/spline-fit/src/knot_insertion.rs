@@ -52,8 +52,7 @@ pub(crate) fn insert_knots(
     let mut breaks: Vec<Breaks> = (0..layout.edges.len()).map(spans).collect();
     // Sides were fitted with fewer spans than their curves where these have many.
     let nets = fitted.par_iter().enumerate().map(|(q, fitted)| {
-        let sides = layout.quads[q].iter().enumerate();
-        let coarse = sides.into_iter().any(|(k, side)| curves[side.edge as usize].spans() > fitted.spans(k));
+        let coarse = (0..4).any(|k| curves[layout.quads[q][k].edge as usize].spans() > fitted.spans(k));
         if coarse { with_knots(setting, curves, fitted, q, &breaks) } else { fitted.net.clone() }
     });
     let mut nets: Vec<Net> = nets.collect();

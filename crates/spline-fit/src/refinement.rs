@@ -35,23 +35,24 @@ const POINTS: usize = 8;
 /// The spans of all edges, and how often they may still be doubled.
 pub(crate) struct Refinement {
     spans: Vec<usize>,
-    left: u32,
-    /// Rounds that are left in all.
+    /// Rounds that are left, the late ones among them.
     rounds: u32,
     /// Factors on the radii of the local fits, one per edge.
     closer: Vec<f64>,
     /// Largest distance, mm.
     tolerance: f64,
+    /// Of the mesh; built when it is first needed.
+    index: Option<SurfaceIndex>,
 }
 
 impl Refinement {
     pub(crate) fn new(setting: &Setting<'_>, parameters: &Parameters) -> Self {
         Self {
             spans: vec![parameters.spans as usize; setting.layout.edges.len()],
-            left: parameters.refinements,
             rounds: if parameters.refinements > 0 { parameters.refinements + LATE_ROUNDS } else { 0 },
             closer: vec![1.0; setting.layout.edges.len()],
             tolerance: parameters.largest_distance(&setting.layout.part.mesh),
+            index: None,
         }
     }
 
@@ -86,21 +87,21 @@ impl Refinement {
         if self.rounds == 0 {
             return false;
         }
+        let late = self.rounds <= LATE_ROUNDS;
         self.rounds -= 1;
-        let limit = if self.left > 0 { self.tolerance } else { LATE * self.tolerance };
+        let limit = if late { LATE * self.tolerance } else { self.tolerance };
         let mut finer = vec![false; self.spans.len()];
-        if self.left > 0 {
-            self.left -= 1;
+        if !late {
             for (sides, _) in
                 setting.layout.quads.iter().zip(&residuals).filter(|(_, r)| **r > self.tolerance)
             {
                 sides.iter().for_each(|side| finer[side.edge as usize] = true);
             }
         }
-        let index = SurfaceIndex::build(&setting.layout.part.mesh);
+        let index = &*self.index.get_or_insert_with(|| SurfaceIndex::build(&setting.layout.part.mesh));
         let far: Vec<bool> = (0..self.spans.len())
             .into_par_iter()
-            .map(|e| self.is_far(setting, network, &index, limit, e))
+            .map(|e| is_far(setting, network, index, limit, e))
             .collect();
         let mut changed = false;
         for e in 0..self.spans.len() {
@@ -115,32 +116,25 @@ impl Refinement {
         }
         changed
     }
+}
 
-    /// Whether a smooth edge is farther than `limit` from the mesh at one of its points, or a vertex of the mesh on its path from it.
-    fn is_far(
-        &self,
-        setting: &Setting<'_>,
-        network: &Network,
-        index: &SurfaceIndex,
-        limit: f64,
-        e: usize,
-    ) -> bool {
-        if setting.roles[e] != EdgeRole::Smooth {
-            return false;
-        }
-        let control = &network.curves[e].control;
-        let count = POINTS * (control.len() / 2 - 1);
-        let curve: Vec<DVec3> =
-            (0..=count).map(|k| hermite::derivatives(control, k as f64 / count as f64)[0]).collect();
-        if curve.iter().any(|&p| index.nearest_within(p, limit).is_none()) {
-            return true;
-        }
-        let edge = &setting.layout.edges[e];
-        edge.path.iter().map(|&v| setting.layout.part.mesh.position(v)).any(|p| {
-            let off = curve.windows(2).map(|w| distance(p, w[0], w[1])).fold(f64::INFINITY, f64::min);
-            off > limit
-        })
+/// Whether a smooth edge is farther than `limit` from the mesh at one of its points, or a vertex of the mesh on its path from it.
+fn is_far(setting: &Setting<'_>, network: &Network, index: &SurfaceIndex, limit: f64, e: usize) -> bool {
+    if setting.roles[e] != EdgeRole::Smooth {
+        return false;
     }
+    let control = &network.curves[e].control;
+    let count = POINTS * (control.len() / 2 - 1);
+    let curve: Vec<DVec3> =
+        (0..=count).map(|k| hermite::derivatives(control, k as f64 / count as f64)[0]).collect();
+    if curve.iter().any(|&p| index.nearest_within(p, limit).is_none()) {
+        return true;
+    }
+    let edge = &setting.layout.edges[e];
+    edge.path.iter().map(|&v| setting.layout.part.mesh.position(v)).any(|p| {
+        let off = curve.windows(2).map(|w| distance(p, w[0], w[1])).fold(f64::INFINITY, f64::min);
+        off > limit
+    })
 }
 
 /// The distance of a point from a segment.
