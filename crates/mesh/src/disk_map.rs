@@ -12,45 +12,141 @@
 use crate::{FaceId, TriangleMesh, VertexId};
 use glam::{DVec2, DVec3};
 use rustc_hash::FxHashMap;
+use std::sync::Arc;
 
 /// Plane coordinates of the vertices of a disk.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct DiskMap {
-    /// Vertex to place, for all vertices of the disk.
-    pub places: FxHashMap<VertexId, DVec2>,
+    /// Vertex to number; shared by the maps of one disk.
+    numbers: Arc<FxHashMap<VertexId, u32>>,
+    places: Vec<(VertexId, DVec2)>,
+    /// Vertices that were added afterwards.
+    added: FxHashMap<VertexId, DVec2>,
+    flipped: usize,
 }
 
 impl DiskMap {
     /// Maps the vertices of `faces`: those in `fixed` to the given places, the others to the mean-value combination
     /// of their neighbours. `None` when some vertex has no path to a fixed one or the numbers overflow.
     pub fn solve(mesh: &TriangleMesh, faces: &[FaceId], fixed: &FxHashMap<VertexId, DVec2>) -> Option<Self> {
-        // Free vertices in the order in which they are met, then reordered for a narrow band.
-        let mut index: FxHashMap<VertexId, usize> =
+        DiskSystem::new(mesh, faces, |v| fixed.contains_key(&v))?.solve(|v| fixed.get(&v).copied())
+    }
+
+    /// Where `vertex` is mapped to; the origin if it does not belong to the disk.
+    #[inline]
+    pub fn at(&self, vertex: VertexId) -> DVec2 {
+        match self.numbers.get(&vertex) {
+            Some(&number) => self.places[number as usize].1,
+            None => self.added.get(&vertex).copied().unwrap_or(DVec2::ZERO),
+        }
+    }
+
+    /// The vertices that were mapped, each with its place.
+    pub fn places(&self) -> &[(VertexId, DVec2)] {
+        &self.places
+    }
+
+    /// Gives a place to a vertex that the disk has got since.
+    pub fn add(&mut self, vertex: VertexId, place: DVec2) {
+        self.added.insert(vertex, place);
+    }
+
+    /// The number of faces whose image was clockwise when the map was made.
+    pub fn flipped(&self) -> usize {
+        self.flipped
+    }
+}
+
+/// The equations of a [`DiskMap`], factored: for maps of one disk with the same fixed vertices at different places.
+#[derive(Debug, Clone)]
+pub struct DiskSystem {
+    /// The vertices of the disk, as they are met in its faces, and their numbers.
+    vertices: Vec<VertexId>,
+    numbers: Arc<FxHashMap<VertexId, u32>>,
+    /// The corners of its faces, as indices of `vertices`.
+    corners: Vec<[u32; 3]>,
+    /// Place of each vertex in the order of elimination; `FIXED` for the fixed ones.
+    rows: Vec<u32>,
+    /// Of each row the weights of fixed vertices, as indices of `vertices`.
+    borders: Csr<(u32, f64)>,
+    matrix: Envelope,
+}
+
+const FIXED: u32 = u32::MAX;
+
+/// Lists of different lengths in one vector.
+#[derive(Debug, Clone)]
+struct Csr<T> {
+    start: Vec<u32>,
+    entries: Vec<T>,
+}
+
+impl<T: Copy + Default> Csr<T> {
+    /// Puts each item on the list of its number; items of a list stay in order.
+    fn new(lists: usize, items: &[(u32, T)]) -> Self {
+        let mut start = vec![0u32; lists + 1];
+        items.iter().for_each(|item| start[item.0 as usize + 1] += 1);
+        (0..lists).for_each(|k| start[k + 1] += start[k]);
+        let mut next = start.clone();
+        let mut entries = vec![T::default(); items.len()];
+        for &(list, item) in items {
+            entries[next[list as usize] as usize] = item;
+            next[list as usize] += 1;
+        }
+        Self { start, entries }
+    }
+
+    fn len(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    fn list(&self, k: usize) -> &[T] {
+        &self.entries[self.start[k] as usize..self.start[k + 1] as usize]
+    }
+
+    fn list_mut(&mut self, k: usize) -> &mut [T] {
+        &mut self.entries[self.start[k] as usize..self.start[k + 1] as usize]
+    }
+}
+
+impl DiskSystem {
+    /// The equations for the vertices of `faces` that are not `fixed`. `None` when some vertex has no path to a fixed one or the
+    /// numbers overflow.
+    pub fn new(mesh: &TriangleMesh, faces: &[FaceId], fixed: impl Fn(VertexId) -> bool) -> Option<Self> {
+        let mut number: FxHashMap<VertexId, u32> =
             FxHashMap::with_capacity_and_hasher(faces.len(), Default::default());
-        let mut free = Vec::new();
-        let mut rows: Vec<Vec<(VertexId, f64)>> = Vec::new();
+        let (mut vertices, mut rows, mut free) = (Vec::new(), Vec::new(), 0u32);
+        let mut corners = Vec::with_capacity(faces.len());
         for &face in faces {
-            let corners = mesh.triangles[face.index()];
+            corners.push(mesh.triangles[face.index()].map(|v| {
+                *number.entry(v).or_insert_with(|| {
+                    vertices.push(v);
+                    rows.push(if fixed(v) { FIXED } else { free });
+                    free += u32::from(rows[rows.len() - 1] != FIXED);
+                    vertices.len() as u32 - 1
+                })
+            }));
+        }
+        let mut items: Vec<(u32, (u32, f64))> = Vec::with_capacity(6 * faces.len());
+        for (&face, numbers) in faces.iter().zip(&corners) {
             let points = mesh.corners(face);
             for k in 0..3 {
-                let (v, a, b) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
-                if fixed.contains_key(&v) {
+                let row = rows[numbers[k] as usize];
+                if row == FIXED {
                     continue;
                 }
-                let row = *index.entry(v).or_insert_with(|| {
-                    free.push(v);
-                    rows.push(Vec::with_capacity(12));
-                    free.len() - 1
-                });
-                let (to_a, to_b) = (points[(k + 1) % 3] - points[k], points[(k + 2) % 3] - points[k]);
+                let (a, b) = ((k + 1) % 3, (k + 2) % 3);
+                let (to_a, to_b) = (points[a] - points[k], points[b] - points[k]);
                 let half = half_angle_tangent(to_a, to_b);
-                rows[row].push((a, half / to_a.length()));
-                rows[row].push((b, half / to_b.length()));
+                items.push((row, (numbers[a], half / to_a.length())));
+                items.push((row, (numbers[b], half / to_b.length())));
             }
         }
+        let mut weights = Csr::new(free as usize, &items);
         // Slivers without area have weights that are zero, infinite or no numbers: bounded weights stay positive, which
         // is all the theorem asks for.
-        for row in &mut rows {
+        for row in 0..weights.len() {
+            let row = weights.list_mut(row);
             let largest = row.iter().map(|e| e.1).filter(|w| w.is_finite()).fold(0.0, f64::max);
             let largest = if largest > 0.0 { largest } else { 1.0 };
             for entry in row.iter_mut() {
@@ -60,63 +156,55 @@ impl DiskMap {
                 };
             }
         }
-        let order = cuthill_mckee(&rows, &index);
-        let mut place = vec![0usize; free.len()];
+        let neighbors = neighbors(&weights, &rows);
+        let order = cuthill_mckee(&neighbors);
+        let mut place = vec![0u32; order.len()];
+        order.iter().enumerate().for_each(|(k, &row)| place[row as usize] = k as u32);
+        let mut matrix = Envelope::new(&order, &place, &neighbors);
+        let mut border_items = Vec::new();
         for (k, &row) in order.iter().enumerate() {
-            place[row] = k;
-        }
-        let mut band = 0;
-        for (row, entries) in rows.iter().enumerate() {
-            for (v, _) in entries {
-                if let Some(&column) = index.get(v) {
-                    band = band.max(place[row].abs_diff(place[column]));
-                }
-            }
-        }
-        let mut system = Banded::new(free.len(), band);
-        let mut right = vec![DVec2::ZERO; free.len()];
-        for (row, entries) in rows.iter().enumerate() {
-            let i = place[row];
-            for &(v, weight) in entries {
-                match index.get(&v) {
-                    Some(&column) => system.add(i, place[column], weight),
-                    None => {
-                        system.absorbed[i] += weight;
-                        right[i] += weight * *fixed.get(&v)?;
+            for &(v, weight) in weights.list(row as usize) {
+                match rows[v as usize] {
+                    FIXED => {
+                        matrix.absorbed[k] += weight;
+                        border_items.push((k as u32, (v, weight)));
                     }
+                    column => *matrix.at(k, place[column as usize] as usize) += weight,
                 }
             }
         }
-        system.solve(&mut right)?;
-        let mut places: FxHashMap<VertexId, DVec2> =
-            FxHashMap::with_capacity_and_hasher(free.len() + fixed.len(), Default::default());
-        for &face in faces {
-            for v in mesh.triangles[face.index()] {
-                let at = match index.get(&v) {
-                    Some(&row) => right[place[row]],
-                    None => *fixed.get(&v)?,
-                };
-                places.insert(v, at);
+        matrix.factor()?;
+        rows.iter_mut().filter(|row| **row != FIXED).for_each(|row| *row = place[*row as usize]);
+        let borders = Csr::new(order.len(), &border_items);
+        let numbers = Arc::new(number);
+        Some(Self { vertices, numbers, corners, rows, borders, matrix })
+    }
+
+    /// The map with the fixed vertices at the given places; `None` where one has none or the numbers overflow.
+    pub fn solve(&self, fixed: impl Fn(VertexId) -> Option<DVec2>) -> Option<DiskMap> {
+        let mut at = vec![DVec2::ZERO; self.vertices.len()];
+        for (at, (&v, &row)) in at.iter_mut().zip(self.vertices.iter().zip(&self.rows)) {
+            if row == FIXED {
+                *at = fixed(v)?;
             }
         }
-        Some(Self { places })
-    }
-
-    /// Where `vertex` is mapped to; the origin if it does not belong to the disk.
-    #[inline]
-    pub fn at(&self, vertex: VertexId) -> DVec2 {
-        self.places.get(&vertex).copied().unwrap_or(DVec2::ZERO)
-    }
-
-    /// The number of faces whose image is clockwise.
-    pub fn flipped(&self, mesh: &TriangleMesh, faces: &[FaceId]) -> usize {
-        faces
-            .iter()
-            .filter(|f| {
-                let [a, b, c] = mesh.triangles[f.index()].map(|v| self.at(v));
-                (b - a).perp_dot(c - a) < 0.0
-            })
-            .count()
+        let mut right = vec![DVec2::ZERO; self.borders.len()];
+        for (k, right) in right.iter_mut().enumerate() {
+            self.borders.list(k).iter().for_each(|&(v, weight)| *right += weight * at[v as usize]);
+        }
+        self.matrix.solve(&mut right)?;
+        for (at, &row) in at.iter_mut().zip(&self.rows) {
+            if row != FIXED {
+                *at = right[row as usize];
+            }
+        }
+        let clockwise = |corners: &&[u32; 3]| {
+            let [a, b, c] = corners.map(|v| at[v as usize]);
+            (b - a).perp_dot(c - a) < 0.0
+        };
+        let flipped = self.corners.iter().filter(clockwise).count();
+        let places = self.vertices.iter().copied().zip(at).collect();
+        Some(DiskMap { numbers: Arc::clone(&self.numbers), places, added: FxHashMap::default(), flipped })
     }
 }
 
@@ -125,105 +213,148 @@ fn half_angle_tangent(a: DVec3, b: DVec3) -> f64 {
     a.cross(b).length() / (a.length() * b.length() + a.dot(b))
 }
 
+/// The free neighbours of each free vertex, in order.
+fn neighbors(weights: &Csr<(u32, f64)>, rows: &[u32]) -> Csr<u32> {
+    let mut neighbors = Csr { start: vec![0], entries: Vec::with_capacity(weights.entries.len() / 2) };
+    let mut list: Vec<u32> = Vec::new();
+    for row in 0..weights.len() {
+        list.clear();
+        list.extend(weights.list(row).iter().map(|&(v, _)| rows[v as usize]).filter(|&row| row != FIXED));
+        list.sort_unstable();
+        list.dedup();
+        neighbors.entries.extend_from_slice(&list);
+        neighbors.start.push(neighbors.entries.len() as u32);
+    }
+    neighbors
+}
+
 /// An order of the free vertices in which neighbours stand close together: breadth-first from an end of the graph.
-fn cuthill_mckee(rows: &[Vec<(VertexId, f64)>], index: &FxHashMap<VertexId, usize>) -> Vec<usize> {
-    let neighbors: Vec<Vec<usize>> = rows
-        .iter()
-        .map(|row| {
-            let mut list: Vec<usize> = row.iter().filter_map(|(v, _)| index.get(v).copied()).collect();
-            list.sort_unstable();
-            list.dedup();
-            list
-        })
-        .collect();
-    let sweep = |start: usize, seen: &mut Vec<bool>, order: &mut Vec<usize>| {
-        let first = order.len();
-        seen[start] = true;
+fn cuthill_mckee(neighbors: &Csr<u32>) -> Vec<u32> {
+    let count = neighbors.len();
+    let sweep = |start: u32, seen: &mut [bool], order: &mut Vec<u32>| {
+        let mut next = order.len();
+        seen[start as usize] = true;
         order.push(start);
-        let mut next = first;
         while next < order.len() {
-            let v = order[next];
+            let found = order.len();
+            let unseen = neighbors.list(order[next] as usize).iter().filter(|&&w| !seen[w as usize]);
+            order.extend(unseen);
+            order[found..].sort_unstable_by_key(|&w| (neighbors.list(w as usize).len(), w));
+            order[found..].iter().for_each(|&w| seen[w as usize] = true);
             next += 1;
-            let mut list: Vec<usize> = neighbors[v].iter().copied().filter(|&w| !seen[w]).collect();
-            list.sort_by_key(|&w| (neighbors[w].len(), w));
-            for w in list {
-                seen[w] = true;
-                order.push(w);
-            }
         }
     };
-    let mut order = Vec::with_capacity(rows.len());
-    let mut seen = vec![false; rows.len()];
-    for start in 0..rows.len() {
-        if seen[start] {
+    let mut order = Vec::with_capacity(count);
+    let (mut seen, mut seen_in_trial) = (vec![false; count], vec![false; count]);
+    let mut trial = Vec::with_capacity(count);
+    for start in 0..count as u32 {
+        if seen[start as usize] {
             continue;
         }
         // The last vertex of a first sweep lies at an end of the component.
-        let mut trial = Vec::new();
-        sweep(start, &mut seen.clone(), &mut trial);
+        trial.clear();
+        sweep(start, &mut seen_in_trial, &mut trial);
         let end = trial.last().copied().unwrap_or(start);
         sweep(end, &mut seen, &mut order);
     }
     order
 }
 
-/// The weights between free vertices as a band matrix, and of each to the fixed ones.
-struct Banded {
-    size: usize,
-    band: usize,
+/// The weights between free vertices as a matrix within its envelope, which elimination does not leave, and of each to the
+/// fixed ones.
+#[derive(Debug, Clone)]
+struct Envelope {
+    /// First and last column of each row; both never fall from row to row.
+    columns: Vec<[u32; 2]>,
+    /// Where the rows begin, and the end.
+    start: Vec<usize>,
     values: Vec<f64>,
     absorbed: Vec<f64>,
 }
 
-impl Banded {
-    fn new(size: usize, band: usize) -> Self {
-        Self { size, band, values: vec![0.0; size * (2 * band + 1)], absorbed: vec![0.0; size] }
+impl Envelope {
+    fn new(order: &[u32], place: &[u32], neighbors: &Csr<u32>) -> Self {
+        let n = order.len();
+        let mut columns: Vec<[u32; 2]> = (0..n as u32).map(|k| [k; 2]).collect();
+        // Eliminating row k joins all of the columns after it up to the last of the rows so far.
+        let mut last = 0;
+        for (k, &row) in order.iter().enumerate() {
+            let reach = neighbors.list(row as usize).iter().map(|&w| place[w as usize]).max().unwrap_or(0);
+            last = last.max(reach).max(k as u32);
+            columns[k][1] = last;
+        }
+        let mut first = 0;
+        for k in 0..n as u32 {
+            while columns[first as usize][1] < k {
+                first += 1;
+            }
+            columns[k as usize][0] = first;
+        }
+        let mut start = vec![0];
+        for (k, [first, last]) in columns.iter().enumerate() {
+            start.push(start[k] + (last - first + 1) as usize);
+        }
+        let values = vec![0.0; start[n]];
+        Self { columns, start, values, absorbed: vec![0.0; n] }
     }
 
-    #[inline]
-    fn at(&self, i: usize, j: usize) -> usize {
-        i * (2 * self.band + 1) + j + self.band - i
+    fn at(&mut self, i: usize, j: usize) -> &mut f64 {
+        &mut self.values[self.start[i] + j - self.columns[i][0] as usize]
     }
 
-    fn add(&mut self, i: usize, j: usize, value: f64) {
-        let at = self.at(i, j);
-        self.values[at] += value;
-    }
-
-    /// Solves in place by elimination without a subtraction (Grassmann, Taksar, Heyman 1985): each pivot is the sum of
-    /// what is left of its row. Weights of slivers differ by many orders of magnitude; a difference of them would be
-    /// rounding, and a cluster of vertices that hardly hangs on to the rest would have no place.
-    fn solve(&mut self, right: &mut [DVec2]) -> Option<()> {
-        let n = self.size;
-        for k in 0..n {
-            let last = (k + self.band).min(n - 1);
-            let pivot = self.absorbed[k] + (k + 1..=last).map(|j| self.values[self.at(k, j)]).sum::<f64>();
+    /// Elimination without a subtraction (Grassmann, Taksar, Heyman 1985): each pivot is the sum of what is left of its
+    /// row. Weights of slivers differ by many orders of magnitude; a difference of them would be rounding, and a cluster of
+    /// vertices that hardly hangs on to the rest would have no place. Pivots take the place of the diagonal, factors that
+    /// of the columns before it.
+    fn factor(&mut self) -> Option<()> {
+        for k in 0..self.columns.len() {
+            let [first, last] = self.columns[k].map(|c| c as usize);
+            let (done, rest) = self.values.split_at_mut(self.start[k + 1]);
+            let row = &mut done[self.start[k]..];
+            let (diagonal, after) = row[k - first..].split_at_mut(1);
+            let pivot = self.absorbed[k] + after.iter().sum::<f64>();
             if !(pivot > 0.0 && pivot.is_finite()) {
                 return None;
             }
-            let diagonal = self.at(k, k);
-            self.values[diagonal] = pivot;
+            diagonal[0] = pivot;
             for i in k + 1..=last {
-                let factor = self.values[self.at(i, k)] / pivot;
+                let at = self.start[i] - self.start[k + 1] + k - self.columns[i][0] as usize;
+                let (factor, own) = rest[at..][..last - k + 1].split_at_mut(1);
+                factor[0] /= pivot;
+                let factor = factor[0];
                 if factor == 0.0 {
                     continue;
                 }
-                for j in (k + 1..=last).filter(|&j| j != i) {
-                    let (to, from) = (self.at(i, j), self.at(k, j));
-                    self.values[to] += factor * self.values[from];
-                }
+                // The diagonal of row i gets something too; its pivot will take the place of it.
+                own.iter_mut().zip(&*after).for_each(|(own, value)| *own += factor * value);
                 self.absorbed[i] += factor * self.absorbed[k];
-                let step = factor * right[k];
-                right[i] += step;
             }
         }
-        for k in (0..n).rev() {
-            let last = (k + self.band).min(n - 1);
-            let mut sum = right[k];
-            for j in k + 1..=last {
-                sum += self.values[self.at(k, j)] * right[j];
+        Some(())
+    }
+
+    /// Solves in place.
+    fn solve(&self, right: &mut [DVec2]) -> Option<()> {
+        let row = |i: usize| {
+            let first = self.columns[i][0] as usize;
+            let (before, from) = self.values[self.start[i]..self.start[i + 1]].split_at(i - first);
+            (first, before, from)
+        };
+        for i in 0..right.len() {
+            let (first, factors, _) = row(i);
+            let mut sum = right[i];
+            for (&factor, &before) in factors.iter().zip(&right[first..i]) {
+                sum += factor * before;
             }
-            right[k] = sum / self.values[self.at(k, k)];
+            right[i] = sum;
+        }
+        for k in (0..right.len()).rev() {
+            let (_, _, from) = row(k);
+            let mut sum = right[k];
+            for (&value, &after) in from[1..].iter().zip(&right[k + 1..]) {
+                sum += value * after;
+            }
+            right[k] = sum / from[0];
             if !right[k].is_finite() {
                 return None;
             }
@@ -286,7 +417,7 @@ mod tests {
         let mesh = grid(16, |x, y| 3.0 * (-40.0 * ((x - 0.4).powi(2) + (y - 0.6).powi(2))).exp());
         let faces: Vec<FaceId> = mesh.faces().collect();
         let map = DiskMap::solve(&mesh, &faces, &border(&mesh)).unwrap();
-        assert_eq!(map.flipped(&mesh, &faces), 0);
+        assert_eq!(map.flipped(), 0);
         let area: f64 = faces
             .iter()
             .map(|f| {

@@ -125,7 +125,7 @@ pub(crate) fn cut(
     map: Option<DiskMap>,
     snap: f64,
 ) -> Result<(VertexId, Vec<Vec<VertexId>>), QuadMatchingError> {
-    let mut cutter = Cutter::new(task, map.unwrap_or(DiskMap { places: FxHashMap::default() }), snap);
+    let mut cutter = Cutter::new(task, map.unwrap_or_default(), snap);
     let site = match task.anchor {
         Some(vertex) => vertex,
         None => cutter.center(tiled, &task.faces, DVec2::ZERO, CENTER),
@@ -225,13 +225,17 @@ impl Cutter {
     /// The vertex nearest to a place in the disk, or a new one there when none is within `near`.
     pub(crate) fn center(&mut self, tiled: &mut Tiled, faces: &[FaceId], goal: DVec2, near: f64) -> VertexId {
         let mesh = &tiled.refiner.part().mesh;
-        let nearest =
-            faces.iter().flat_map(|f| mesh.triangles[f.index()]).filter(|v| !self.border.contains(v)).min_by(
-                |&a, &b| {
-                    let d = |v| self.map.at(v).distance_squared(goal);
-                    d(a).total_cmp(&d(b)).then(a.cmp(&b))
-                },
-            );
+        let inner = |v: &VertexId| !self.border.contains(v);
+        let nearest = if self.map.places().is_empty() {
+            // Without a map all of them lie at the origin.
+            faces.iter().flat_map(|f| mesh.triangles[f.index()]).filter(inner).min()
+        } else {
+            let squares = self.map.places().iter().filter(|(v, _)| inner(v));
+            squares
+                .map(|&(v, at)| (at.distance_squared(goal), v))
+                .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+                .map(|(_, v)| v)
+        };
         if let Some(vertex) = nearest
             && self.map.at(vertex).distance(goal) < near
         {
@@ -259,7 +263,7 @@ impl Cutter {
         let corners = mesh.triangles[best.2.index()];
         let place = (0..3).map(|k| weights[k] * self.map.at(corners[k])).sum();
         let vertex = tiled.split_face(best.2, weights);
-        self.map.places.insert(vertex, place);
+        self.map.add(vertex, place);
         vertex
     }
 
@@ -309,7 +313,7 @@ impl Cutter {
                 let t = t.clamp(0.02, 0.98);
                 let place = self.map.at(a).lerp(self.map.at(b), t);
                 let vertex = tiled.split_edge(across, t);
-                self.map.places.insert(vertex, place);
+                self.map.add(vertex, place);
                 self.cuts.push((key(a, b), vertex));
                 vertex
             };
@@ -341,7 +345,7 @@ impl Cutter {
                 if let Some(h) = tiled.refiner.half_edge(a, b) {
                     let place = self.map.at(a).lerp(self.map.at(b), 0.5);
                     let vertex = tiled.split_edge(h, 0.5);
-                    self.map.places.insert(vertex, place);
+                    self.map.add(vertex, place);
                 }
             }
         }

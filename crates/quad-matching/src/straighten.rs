@@ -111,7 +111,7 @@ fn straighten_one(
     }
     let Some(map) = DiskMap::solve(mesh, &faces, &fixed) else { return Ok(()) };
     // A region much longer than wide crowds its far ends: there the straight line is no better than the old path.
-    if map.flipped(mesh, &faces) > 0 {
+    if map.flipped() > 0 {
         return Ok(());
     }
     faces.iter().for_each(|f| tiled.tile_of_face[f.index()] = id);
