@@ -62,6 +62,48 @@ impl Node {
     }
 }
 
+/// Two siblings, coordinate beside coordinate: the distances of both boxes are one run of vector instructions.
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    low: [[f64; 2]; 3],
+    high: [[f64; 2]; 3],
+    first: [u32; 2],
+    count: [u32; 2],
+}
+
+impl Pair {
+    fn new([a, b]: [Node; 2]) -> Self {
+        let both = |x: DVec3, y: DVec3| [[x.x, y.x], [x.y, y.y], [x.z, y.z]];
+        Self {
+            low: both(a.low, b.low),
+            high: both(a.high, b.high),
+            first: [a.first, b.first],
+            count: [a.count, b.count],
+        }
+    }
+
+    #[inline]
+    fn node(&self, side: usize) -> Node {
+        let of = |bound: &[[f64; 2]; 3]| DVec3::new(bound[0][side], bound[1][side], bound[2][side]);
+        Node { low: of(&self.low), high: of(&self.high), first: self.first[side], count: self.count[side] }
+    }
+
+    /// [`Node::distance_squared`] of both, by the same operations.
+    #[inline]
+    fn distances_squared(&self, p: DVec3) -> [f64; 2] {
+        let p = p.to_array();
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        let mut sum = [0.0; 2];
+        for k in 0..3 {
+            for side in 0..2 {
+                let off = larger(larger(self.low[k][side] - p[k], p[k] - self.high[k][side]), 0.0);
+                sum[side] += off * off;
+            }
+        }
+        sum
+    }
+}
+
 /// The answer of [`SurfaceIndex::nearest`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearestPoint {
@@ -87,7 +129,10 @@ pub struct RayHit {
 /// A snapshot of a surface, arranged for queries.
 #[derive(Debug, Clone)]
 pub struct SurfaceIndex {
-    nodes: Vec<Node>,
+    /// None without faces.
+    root: Option<Node>,
+    /// All other nodes, numbered from 1 on, siblings together.
+    pairs: Vec<Pair>,
     faces: Vec<FaceId>,
     corners: Vec<[DVec3; 3]>,
 }
@@ -109,7 +154,17 @@ impl SurfaceIndex {
         builder.build();
         let faces: Vec<FaceId> = builder.order.into_iter().map(FaceId).collect();
         let corners = faces.iter().map(|&f| mesh.corners(f)).collect();
-        Self { nodes: builder.nodes, faces, corners }
+        let pairs =
+            builder.nodes.get(1..).unwrap_or_default().as_chunks().0.iter().copied().map(Pair::new).collect();
+        Self { root: builder.nodes.first().copied(), pairs, faces, corners }
+    }
+
+    #[inline]
+    fn node(&self, index: u32) -> Option<Node> {
+        match index {
+            0 => self.root,
+            _ => Some(self.pairs[(index as usize - 1) / 2].node((index as usize - 1) % 2)),
+        }
     }
 
     /// True for an index without faces.
@@ -119,7 +174,7 @@ impl SurfaceIndex {
 
     /// The corners of the bounding box of all faces; zeros without faces.
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        self.nodes.first().map_or((DVec3::ZERO, DVec3::ZERO), |n| (n.low, n.high))
+        self.root.map_or((DVec3::ZERO, DVec3::ZERO), |n| (n.low, n.high))
     }
 
     /// The point of the surface nearest to `point`. `None` without faces or for a point that is not finite.
@@ -129,25 +184,24 @@ impl SurfaceIndex {
 
     /// As [`Self::nearest`], but `None` where the surface is farther away than `limit`.
     pub fn nearest_within(&self, point: DVec3, limit: f64) -> Option<NearestPoint> {
-        let root = self.nodes.first()?;
+        let root = self.root?;
         if !point.is_finite() {
             return None;
         }
         let mut best = limit * limit;
         let mut found: Option<(DVec3, FaceId)> = None;
-        let mut stack = [(0u32, 0.0f64); STACK];
-        stack[0] = (0, root.distance_squared(point));
+        // Of each node what it holds, and how far it is.
+        let mut stack = [(0u32, 0u32, 0.0f64); STACK];
+        stack[0] = (root.first, root.count, root.distance_squared(point));
         let mut depth = 1;
         while depth > 0 {
             depth -= 1;
-            let (index, distance) = stack[depth];
+            let (first, count, distance) = stack[depth];
             if distance > best {
                 continue;
             }
-            let node = &self.nodes[index as usize];
-            if node.count > 0 {
-                let range = node.first as usize..(node.first + node.count) as usize;
-                for slot in range {
+            if count > 0 {
+                for slot in first as usize..(first + count) as usize {
                     let q = closest_point_on_triangle(point, self.corners[slot]);
                     let d = point.distance_squared(q);
                     let face = self.faces[slot];
@@ -158,15 +212,12 @@ impl SurfaceIndex {
                 }
                 continue;
             }
-            let (near, far) = (node.first, node.first + 1);
-            let near_distance = self.nodes[near as usize].distance_squared(point);
-            let far_distance = self.nodes[far as usize].distance_squared(point);
-            let mut children = [(near, near_distance), (far, far_distance)];
-            if near_distance > far_distance {
-                children.swap(0, 1);
+            let pair = &self.pairs[(first as usize - 1) / 2];
+            let distances = pair.distances_squared(point);
+            let near = usize::from(distances[0] > distances[1]);
+            for (place, side) in [(depth, 1 - near), (depth + 1, near)] {
+                stack[place] = (pair.first[side], pair.count[side], distances[side]);
             }
-            stack[depth] = children[1];
-            stack[depth + 1] = children[0];
             depth += 2;
         }
         found.map(|(q, face)| NearestPoint { distance: best.sqrt(), point: q, face })
@@ -197,7 +248,7 @@ impl SurfaceIndex {
     /// The orientation of the faces does not matter. A point on the surface may get either answer. A ray that passes
     /// too close to an edge is given up for one in another direction.
     pub fn contains(&self, point: DVec3) -> bool {
-        let Some(root) = self.nodes.first() else { return false };
+        let Some(root) = self.root else { return false };
         // Not `>`: a coordinate that is not a number must be outside.
         if !(point.cmpge(root.low).all() && point.cmple(root.high).all()) {
             return false;
@@ -240,20 +291,21 @@ impl SurfaceIndex {
 
     /// The leaves, for [`Self::pairs_of_leaf`].
     pub(crate) fn leaves(&self) -> Vec<u32> {
-        (0..self.nodes.len() as u32).filter(|&n| self.nodes[n as usize].count > 0).collect()
+        let is_leaf = |&n: &u32| self.node(n).is_some_and(|node| node.count > 0);
+        (0..=2 * self.pairs.len() as u32).filter(is_leaf).collect()
     }
 
     /// Hands pairs of faces with overlapping boxes to `visit`: over all leaves each pair once. The faces of a leaf
     /// share one walk through the tree.
     pub(crate) fn pairs_of_leaf(&self, leaf: u32, mut visit: impl FnMut(FaceId, FaceId)) {
-        let leaf = self.nodes[leaf as usize];
+        let Some(leaf) = self.node(leaf) else { return };
         let slots = |n: &Node| n.first as usize..(n.first + n.count) as usize;
         let own: Vec<_> = slots(&leaf).map(|slot| (slot, extent(self.corners[slot]))).collect();
         let mut stack = [0u32; STACK];
         let mut depth = 1;
         while depth > 0 {
             depth -= 1;
-            let node = &self.nodes[stack[depth] as usize];
+            let Some(node) = self.node(stack[depth]) else { continue };
             if node.low.cmpgt(leaf.high).any() || node.high.cmplt(leaf.low).any() {
                 continue;
             }
@@ -263,7 +315,7 @@ impl SurfaceIndex {
                 depth += 2;
                 continue;
             }
-            for other in slots(node).filter(|&other| other > leaf.first as usize) {
+            for other in slots(&node).filter(|&other| other > leaf.first as usize) {
                 let (low, high) = extent(self.corners[other]);
                 for &(slot, (own_low, own_high)) in own.iter().filter(|o| o.0 < other) {
                     if own_low.cmple(high).all() && own_high.cmpge(low).all() {
@@ -283,12 +335,10 @@ impl SurfaceIndex {
         limit: &mut f64,
         mut visit: impl FnMut(usize, &mut f64) -> bool,
     ) {
-        if self.nodes.is_empty() {
-            return;
-        }
+        let Some(root) = self.root else { return };
         let inverse = direction.recip();
         let mut stack = [(0u32, 0.0f64); STACK];
-        stack[0] = (0, self.nodes[0].entry(origin, inverse, *limit));
+        stack[0] = (0, root.entry(origin, inverse, *limit));
         let mut depth = 1;
         while depth > 0 {
             depth -= 1;
@@ -296,7 +346,7 @@ impl SurfaceIndex {
             if entry > *limit || entry == f64::INFINITY {
                 continue;
             }
-            let node = &self.nodes[index as usize];
+            let Some(node) = self.node(index) else { continue };
             if node.count > 0 {
                 for slot in node.first as usize..(node.first + node.count) as usize {
                     if !visit(slot, limit) {
@@ -305,11 +355,9 @@ impl SurfaceIndex {
                 }
                 continue;
             }
-            let (near, far) = (node.first, node.first + 1);
-            let mut children = [
-                (near, self.nodes[near as usize].entry(origin, inverse, *limit)),
-                (far, self.nodes[far as usize].entry(origin, inverse, *limit)),
-            ];
+            let pair = &self.pairs[(node.first as usize - 1) / 2];
+            let mut children =
+                [0, 1].map(|k| (node.first + k, pair.node(k as usize).entry(origin, inverse, *limit)));
             if children[0].1 > children[1].1 {
                 children.swap(0, 1);
             }
