@@ -107,7 +107,7 @@ pub(super) fn cylinders(
     // Most candidates of a noisy surface fail without a trace, and then the next can be grown at the same time. One that leaves a
     // trace may change what comes after it, so it goes alone: what is found does not depend on the size of the batches.
     let mut size = 1;
-    let mut insides = vec![vec![false; mesh.face_count()]; MOST_AT_ONCE];
+    let mut scratches: Vec<Scratch> = (0..MOST_AT_ONCE).map(|_| Scratch::new(mesh)).collect();
     while next < candidates.len() {
         progress.check()?;
         let is_open = |search: &Search<'_>, refused: &[bool], c: &Candidate| {
@@ -120,22 +120,22 @@ pub(super) fn cylinders(
             }
             next += 1;
         }
-        let grow = |search: &Search<'_>, inside: &mut Vec<bool>, candidate: &Candidate| {
-            let (cylinder, faces) = search.grow(candidate, inside)?;
+        let grow = |search: &Search<'_>, scratch: &mut Scratch, candidate: &Candidate| {
+            let (cylinder, faces) = search.grow(candidate, scratch)?;
             let closed = search.judge(&cylinder, &faces, candidate.edge);
             Some((cylinder, faces, closed))
         };
-        let outside = || vec![false; mesh.face_count()];
         let walls: Vec<_> = batch
             .par_iter()
-            .map_init(outside, |inside, candidate| grow(&search, inside, candidate))
+            .zip(&mut scratches)
+            .map(|(candidate, scratch)| grow(&search, scratch, candidate))
             .collect();
         let (mut traces, mut walls_changed) = (false, false);
         for (candidate, wall) in batch.into_iter().zip(walls) {
             if !is_open(&search, &refused, candidate) {
                 continue;
             }
-            let wall = if walls_changed { grow(&search, &mut insides[0], candidate) } else { wall };
+            let wall = if walls_changed { grow(&search, &mut scratches[0], candidate) } else { wall };
             let Some((cylinder, faces, closed)) = wall else { continue };
             traces = true;
             walls_changed |= closed.is_some();
@@ -184,12 +184,30 @@ pub(super) fn through(mesh: &TriangleMesh, faces: &[FaceId]) -> Option<(Cylinder
     Some((cylinder, outward < 0.0))
 }
 
-/// The distinct vertices of some faces.
+/// The distinct vertices of some faces, in order.
 pub(super) fn points(mesh: &TriangleMesh, faces: &[FaceId]) -> Vec<DVec3> {
     let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| mesh.triangles[f.index()]).collect();
     vertices.sort_unstable();
     vertices.dedup();
     vertices.iter().map(|&v| mesh.position(v)).collect()
+}
+
+/// What growing walls uses again and again; between walls nothing is inside and nothing known.
+struct Scratch {
+    inside: Vec<bool>,
+    /// Of the vertices that were looked at whether they lie on the cylinder.
+    on_it: Vec<Option<bool>>,
+    looked_at: Vec<VertexId>,
+}
+
+impl Scratch {
+    fn new(mesh: &TriangleMesh) -> Self {
+        Self {
+            inside: vec![false; mesh.face_count()],
+            on_it: vec![None; mesh.vertex_count()],
+            looked_at: Vec::new(),
+        }
+    }
 }
 
 impl Search<'_> {
@@ -279,8 +297,9 @@ impl Search<'_> {
 
     /// Grows from the seed over facets with all vertices on the cylinder, refits, and repeats until nothing changes.
     ///
-    /// `inside` is all false before and after: clearing what was set costs the size of the wall, not of the mesh.
-    fn grow(&self, candidate: &Candidate, inside: &mut [bool]) -> Option<(Cylinder, Vec<FaceId>)> {
+    /// The scratch is as new before and after: clearing what was set costs the size of the wall, not of the mesh.
+    fn grow(&self, candidate: &Candidate, scratch: &mut Scratch) -> Option<(Cylinder, Vec<FaceId>)> {
+        let Scratch { inside, on_it, looked_at } = scratch;
         let mut cylinder = candidate.cylinder;
         let side = if candidate.hollow { -1.0 } else { 1.0 };
         let mut faces: Vec<FaceId> = Vec::new();
@@ -291,25 +310,27 @@ impl Search<'_> {
             // Squares instead of roots: this is asked for more often than anything else.
             let (least, most) =
                 ((cylinder.radius - limit).max(0.0).powi(2), (cylinder.radius + limit).powi(2));
-            let fits = |f: FaceId| {
-                !self.taken[f.index()]
-                    && self.mesh.corners(f).iter().all(|&p| {
-                        let square = cylinder.radial(p).length_squared();
-                        least <= square && square <= most
-                    })
-                    && {
-                        let radial = cylinder.radial(self.mesh.centroid(f));
-                        let cosine = side * self.normals[f.index()].dot(radial);
-                        cosine > 0.0 && cosine * cosine > WALL_COSINE * WALL_COSINE * radial.length_squared()
-                    }
+            // Each vertex is a corner of six faces.
+            let mut is_on_it = |v: VertexId| {
+                *on_it[v.index()].get_or_insert_with(|| {
+                    looked_at.push(v);
+                    let square = cylinder.radial(self.mesh.position(v)).length_squared();
+                    least <= square && square <= most
+                })
             };
-            if !fits(candidate.seed) {
-                return None;
-            }
+            let mut fits = |f: FaceId| {
+                !self.taken[f.index()] && self.mesh.triangles[f.index()].into_iter().all(&mut is_on_it) && {
+                    let radial = cylinder.radial(self.mesh.centroid(f));
+                    let cosine = side * self.normals[f.index()].dot(radial);
+                    cosine > 0.0 && cosine * cosine > WALL_COSINE * WALL_COSINE * radial.length_squared()
+                }
+            };
             let before = faces.len();
             faces.clear();
-            faces.push(candidate.seed);
-            inside[candidate.seed.index()] = true;
+            if fits(candidate.seed) {
+                faces.push(candidate.seed);
+                inside[candidate.seed.index()] = true;
+            }
             let mut next = 0;
             while next < faces.len() {
                 for k in 0..3 {
@@ -321,9 +342,8 @@ impl Search<'_> {
                 }
                 next += 1;
             }
-            for f in &faces {
-                inside[f.index()] = false;
-            }
+            faces.iter().for_each(|f| inside[f.index()] = false);
+            looked_at.drain(..).for_each(|v| on_it[v.index()] = None);
             if faces.len() < FEWEST_FACES {
                 return None;
             }
