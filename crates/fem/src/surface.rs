@@ -98,7 +98,7 @@ impl Selector {
                 (0.0..=*length).contains(&along)
                     && (p - *point).reject_from_normalized(*axis).length_squared() <= radius * radius
             }
-            Self::Faces(index, slack) => index.nearest_within(p, *slack).is_some(),
+            Self::Faces(index, slack) => index.is_within(p, *slack),
         }
     }
 

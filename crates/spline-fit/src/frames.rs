@@ -256,7 +256,11 @@ fn frame(
 
 /// The point of a polyline at a fraction of its length.
 pub(crate) fn point_at(points: &[DVec3], share: f64) -> DVec3 {
-    let along = crate::samples::arc_length(points);
+    point_along(points, &crate::samples::arc_length(points), share)
+}
+
+/// The same where the arc lengths of its points are known.
+pub(crate) fn point_along(points: &[DVec3], along: &[f64], share: f64) -> DVec3 {
     let k = along.partition_point(|&s| s <= share).clamp(1, points.len() - 1);
     let step = along[k] - along[k - 1];
     let x = if step > 0.0 { (share - along[k - 1]) / step } else { 0.0 };

@@ -4,6 +4,7 @@
 //! and slopes themselves, and nothing has to be solved for.
 
 use crate::Basis;
+use glam::DVec2;
 use topipe_mesh::DVec3;
 
 /// The basis with `spans` equal spans, at least one, and double interior knots.
@@ -42,18 +43,22 @@ pub(crate) fn coarsened(curve: &[DVec3], spans: usize) -> Vec<DVec3> {
     control(&points, &slopes)
 }
 
-/// The four functions of [`basis`] that are not zero at `t` in [0, 1]: index of the first, values, first derivatives.
-/// The same as [`Basis::evaluate`] gives, several times faster.
-pub(crate) fn local(spans: usize, t: f64) -> (usize, [f64; 4], [f64; 4]) {
-    let n = spans as f64;
-    let place = t.clamp(0.0, 1.0) * n;
-    let k = (place as usize).min(spans - 1);
-    let (x, y) = (place - k as f64, 1.0 - (place - k as f64));
-    let bernstein = |b: [f64; 4]| {
-        // The point at an inner break is the middle of the control points beside it.
-        let (first, last) = (if k == 0 { 1.0 } else { 0.5 }, if k + 1 == spans { 1.0 } else { 0.5 });
-        [first * b[0], b[1] + (1.0 - first) * b[0], b[2] + (1.0 - last) * b[3], last * b[3]]
-    };
+/// The four functions of [`basis`] that are not zero at `t` in [0, 1], in two directions side by side: indices of the first
+/// ones; values and slopes, those of the first direction in x, of the second in y. The same as [`Basis::evaluate`] gives, several
+/// times faster.
+#[inline]
+pub(crate) fn local_pair(spans: [usize; 2], t: [f64; 2]) -> ([usize; 2], [DVec2; 4], [DVec2; 4]) {
+    let n = DVec2::new(spans[0] as f64, spans[1] as f64);
+    let place = DVec2::new(t[0].clamp(0.0, 1.0), t[1].clamp(0.0, 1.0)) * n;
+    let k = [(place.x as usize).min(spans[0] - 1), (place.y as usize).min(spans[1] - 1)];
+    let x = place - DVec2::new(k[0] as f64, k[1] as f64);
+    let y = DVec2::ONE - x;
+    // The point at an inner break is the middle of the control points beside it.
+    let share = |at_end: bool| if at_end { 1.0 } else { 0.5 };
+    let first = DVec2::new(share(k[0] == 0), share(k[1] == 0));
+    let last = DVec2::new(share(k[0] + 1 == spans[0]), share(k[1] + 1 == spans[1]));
+    let bernstein =
+        |b: [DVec2; 4]| [first * b[0], b[1] + (1.0 - first) * b[0], b[2] + (1.0 - last) * b[3], last * b[3]];
     let values = bernstein([y * y * y, 3.0 * x * y * y, 3.0 * x * x * y, x * x * x]);
     let slopes = bernstein([
         -3.0 * n * y * y,
@@ -61,7 +66,7 @@ pub(crate) fn local(spans: usize, t: f64) -> (usize, [f64; 4], [f64; 4]) {
         3.0 * n * x * (2.0 * y - x),
         3.0 * n * x * x,
     ]);
-    (2 * k, values, slopes)
+    (k.map(|k| 2 * k), values, slopes)
 }
 
 /// The value of a curve at `t` in [0, 1], and its first two derivatives.
@@ -192,7 +197,16 @@ mod tests {
             let basis = basis(spans);
             for k in 0..=64 {
                 let t = k as f64 / 64.0;
-                let (first, values, slopes) = local(spans, t);
+                // In x with one more span in y, and the other way round.
+                let pairs = [
+                    (0, local_pair([spans, spans + 1], [t, 0.3])),
+                    (1, local_pair([spans + 1, spans], [0.3, t])),
+                ];
+                let [one, other] = pairs.map(|(side, (first, values, slopes))| {
+                    (first[side], values.map(|v| v[side]), slopes.map(|v| v[side]))
+                });
+                assert_eq!(one, other);
+                let (first, values, slopes) = one;
                 let expected = basis.evaluate(t);
                 let dense = |first: usize, list: &[f64]| {
                     let mut all = vec![0.0; basis.len()];

@@ -29,6 +29,7 @@ mod cholesky;
 pub mod control_nets;
 mod corners;
 mod crease_curves;
+mod distances;
 mod edge_curve;
 mod energy;
 mod error;

@@ -6,7 +6,7 @@ use crate::fans::{EdgeRole, Spoke};
 use crate::frames::{Frames, crease_tangents};
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
-use crate::smooth_curves::{SmoothCurve, smooth_curve};
+use crate::smooth_curves::{InnerFits, SmoothCurve, smooth_curve};
 use crate::twist::{Leg, leg, turning};
 use rayon::prelude::*;
 use topipe_mesh::DVec3;
@@ -31,13 +31,16 @@ pub(crate) struct Network {
     pub(crate) curves: Vec<Curve>,
 }
 
-/// Finds vertices and edges; `spans` are those of the curves, `reach` the radii of the local fits, mm.
+/// Finds vertices and edges; `spans` are those of the curves, `reach` the radii of the local fits, mm. Of each edge the
+/// local fits that are `known` from another network of this setting are not made again.
 pub(crate) fn network(
     setting: &Setting<'_>,
     samples: &[PatchSamples],
     spans: &[usize],
     reach: &[f64],
+    known: &mut Vec<InnerFits>,
 ) -> Result<Network, SplineFitError> {
+    known.resize_with(spans.len(), InnerFits::default);
     let layout = setting.layout;
     let given = setting.given(samples, reach);
     let singular = |e: usize| {
@@ -46,11 +49,13 @@ pub(crate) fn network(
     };
     let tangents = crease_tangents(&given);
     let frames = Frames::new(&given, &tangents)?;
-    let mut smooth: Vec<Option<SmoothCurve>> = (0..layout.edges.len())
-        .into_par_iter()
-        .map(|e| match setting.roles[e] {
+    let mut smooth: Vec<Option<SmoothCurve>> = known
+        .par_iter_mut()
+        .enumerate()
+        .map(|(e, known)| match setting.roles[e] {
             EdgeRole::Smooth => {
-                smooth_curve(&given, &setting.sectors, &frames, e, &setting.beside[e], spans[e])
+                let edge = (e, &setting.beside[e][..]);
+                smooth_curve(&given, &setting.sectors, &frames, edge, spans[e], known)
                     .map(Some)
                     .ok_or_else(|| singular(e))
             }

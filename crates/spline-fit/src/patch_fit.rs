@@ -6,10 +6,12 @@
 
 use crate::breaks::Breaks;
 use crate::cholesky::Banded;
+use crate::distances::add_distances;
 use crate::energy::Gram;
 use crate::hermite;
-use crate::samples::{PatchSamples, Sample};
+use crate::samples::PatchSamples;
 use crate::{Basis, SurfacePoint};
+use glam::DVec2;
 use topipe_mesh::DVec3;
 
 /// A side of a patch as the patch runs along it: v = 0, u = 1, v = 1 (backwards), u = 0 (backwards).
@@ -67,21 +69,29 @@ impl Net {
 
     pub(crate) fn evaluate(&self, u: f64, v: f64) -> SurfacePoint {
         let width = self.basis_u.len();
-        let (i, bu, su) = hermite::local(width / 2 - 1, u);
-        let (j, bv, sv) = hermite::local(self.basis_v.len() / 2 - 1, v);
-        let (mut position, mut du, mut dv) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        let spans = [width / 2 - 1, self.basis_v.len() / 2 - 1];
+        let ([i, j], values, slopes) = hermite::local_pair(spans, [u, v]);
+        // Coordinate by coordinate, what has the factors of the value and of the slope in u side by side.
+        let (mut both, mut dv) = ([DVec2::ZERO; 3], [0.0; 3]);
         for l in 0..4 {
             let row = &self.control[(j + l) * width + i..][..4];
-            let (mut value, mut slope) = (DVec3::ZERO, DVec3::ZERO);
+            let mut along = [DVec2::ZERO; 3];
             for k in 0..4 {
-                value += bu[k] * row[k];
-                slope += su[k] * row[k];
+                let factors = DVec2::new(values[k].x, slopes[k].x);
+                let point = row[k].to_array();
+                (0..3).for_each(|c| along[c] += factors * point[c]);
             }
-            position += bv[l] * value;
-            du += bv[l] * slope;
-            dv += sv[l] * value;
+            for c in 0..3 {
+                both[c] += values[l].y * along[c];
+                dv[c] += slopes[l].y * along[c].x;
+            }
         }
-        SurfacePoint { position, du, dv }
+        let [x, y, z] = both;
+        SurfacePoint {
+            position: DVec3::new(x.x, y.x, z.x),
+            du: DVec3::new(x.y, y.y, z.y),
+            dv: DVec3::from_array(dv),
+        }
     }
 }
 
@@ -98,52 +108,6 @@ pub(crate) fn side_rows(k: usize, nu: usize, nv: usize) -> Vec<(usize, usize)> {
 fn on_side(at: usize, nu: usize, nv: usize) -> bool {
     let (i, j) = (at % nu, at / nu);
     i == 0 || j == 0 || i == nu - 1 || j == nv - 1
-}
-
-/// Adds the normal equations of the squared distances. The samples of a cell of the net share their sixteen functions:
-/// their products are summed up in one small matrix before they are added to the large one.
-fn distance(
-    samples: &[Sample],
-    [ku, kv]: [usize; 2],
-    control: &[DVec3],
-    slots: &[Option<usize>],
-    matrix: &mut Banded,
-    right: &mut [DVec3],
-) {
-    let width = 2 * ku + 2;
-    let cell = |s: &Sample| {
-        let index = |t: f64, k: usize| ((t.clamp(0.0, 1.0) * k as f64) as usize).min(k - 1);
-        index(s.v, kv) * ku + index(s.u, ku)
-    };
-    let mut order: Vec<(usize, usize)> = samples.iter().enumerate().map(|(i, s)| (cell(s), i)).collect();
-    order.sort_unstable();
-    for group in order.chunk_by(|a, b| a.0 == b.0) {
-        let (mut products, mut sums) = ([[0.0; 16]; 16], [DVec3::ZERO; 16]);
-        for &(_, i) in group {
-            let sample = &samples[i];
-            let ((_, bu, _), (_, bv, _)) = (hermite::local(ku, sample.u), hermite::local(kv, sample.v));
-            let values: [f64; 16] = std::array::from_fn(|k| bu[k % 4] * bv[k / 4]);
-            for a in 0..16 {
-                let weighted = sample.weight * values[a];
-                sums[a] += weighted * sample.point;
-                for b in 0..16 {
-                    products[a][b] += weighted * values[b];
-                }
-            }
-        }
-        let first = group[0].0 / ku * 2 * width + group[0].0 % ku * 2;
-        let at = |k: usize| first + k / 4 * width + k % 4;
-        for a in 0..16 {
-            let Some(row) = slots[at(a)] else { continue };
-            right[row] += sums[a];
-            for b in 0..16 {
-                match slots[at(b)] {
-                    Some(column) => matrix.add(row, column, products[a][b]),
-                    None => right[row] -= products[a][b] * control[at(b)],
-                }
-            }
-        }
-    }
 }
 
 /// Fits the inside; `bending` is the weight of the bending energy against the mean squared distance. `None` when the
@@ -196,19 +160,25 @@ pub(crate) fn fit_patch(
     let mut matrix = Banded::zero(count, band);
     let mut right = vec![DVec3::ZERO; count];
 
-    distance(&samples.samples, [ku, kv], &control, &slots, &mut matrix, &mut right);
+    add_distances(&samples.samples, [ku, kv], &control, &slots, &mut matrix, &mut right);
     // Bending.
     let reach = |k: usize, n: usize| k.saturating_sub(3)..(k + 4).min(n);
     for j in 1..nv - 1 {
         for i in 1..nu - 1 {
             let Some(row) = slots[j * nu + i] else { continue };
             for l in reach(j, nv) {
+                let across = [0, 1, 2].map(|d| grams[1].at(d, j, l));
                 for k in reach(i, nu) {
+                    let slot = slots[l * nu + k];
+                    // Above the diagonal, which nobody asks for.
+                    if slot.is_some_and(|column| column > row) {
+                        continue;
+                    }
                     let value = bending
-                        * (grams[0].at(2, i, k) * grams[1].at(0, j, l)
-                            + 2.0 * grams[0].at(1, i, k) * grams[1].at(1, j, l)
-                            + grams[0].at(0, i, k) * grams[1].at(2, j, l));
-                    match slots[l * nu + k] {
+                        * (grams[0].at(2, i, k) * across[0]
+                            + 2.0 * grams[0].at(1, i, k) * across[1]
+                            + grams[0].at(0, i, k) * across[2]);
+                    match slot {
                         Some(column) => matrix.add(row, column, value),
                         None => right[row] -= value * control[l * nu + k],
                     }

@@ -127,7 +127,7 @@ fn is_far(setting: &Setting<'_>, network: &Network, index: &SurfaceIndex, limit:
     let count = POINTS * (control.len() / 2 - 1);
     let curve: Vec<DVec3> =
         (0..=count).map(|k| hermite::derivatives(control, k as f64 / count as f64)[0]).collect();
-    if curve.iter().any(|&p| index.nearest_within(p, limit).is_none()) {
+    if curve.iter().any(|&p| !index.is_within(p, limit)) {
         return true;
     }
     let edge = &setting.layout.edges[e];

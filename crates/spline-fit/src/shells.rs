@@ -1,7 +1,9 @@
 //! The connected shells of a surface, and which of them are cavities.
 
+use crate::basis::{Basis, Local};
 use crate::energy::gauss;
 use crate::{Patch, SplineSurface};
+use rayon::prelude::*;
 use topipe_mesh::DVec3;
 
 /// A connected set of patches and analytic faces.
@@ -21,23 +23,38 @@ pub struct Shell {
 /// polynomial pieces.
 fn volume(patch: &Patch, center: DVec3) -> f64 {
     // The integrand has degree 3 p - 1 in each direction.
-    let points = |degree: usize| gauss(3 * degree / 2 + 1);
-    let (rule_u, rule_v) = (points(patch.basis_u.degree()), points(patch.basis_v.degree()));
+    let (spans_u, spans_v) = (Span::all(&patch.basis_u), Span::all(&patch.basis_v));
     let mut sum = 0.0;
-    for span_v in patch.basis_v.breaks().windows(2) {
-        for span_u in patch.basis_u.breaks().windows(2) {
-            for &(y, wy) in &rule_v {
-                for &(x, wx) in &rule_u {
-                    let u = span_u[0] + x * (span_u[1] - span_u[0]);
-                    let v = span_v[0] + y * (span_v[1] - span_v[0]);
-                    let at = patch.evaluate(u, v);
-                    let weight = wx * wy * (span_u[1] - span_u[0]) * (span_v[1] - span_v[0]);
+    for span_v in &spans_v {
+        for span_u in &spans_u {
+            for (v, wy) in &span_v.points {
+                for (u, wx) in &span_u.points {
+                    let at = patch.evaluate_at(u, v);
+                    let weight = wx * wy * span_u.length * span_v.length;
                     sum += weight * (at.position - center).dot(at.du.cross(at.dv));
                 }
             }
         }
     }
     sum / 3.0
+}
+
+/// A span of a basis: its functions at the points of a quadrature, with the weights.
+struct Span {
+    length: f64,
+    points: Vec<(Local, f64)>,
+}
+
+impl Span {
+    fn all(basis: &Basis) -> Vec<Self> {
+        let rule = gauss(3 * basis.degree() / 2 + 1);
+        let span = |ends: &[f64]| {
+            let length = ends[1] - ends[0];
+            let point = |&(x, weight): &(f64, f64)| (basis.evaluate(ends[0] + x * length), weight);
+            Self { length, points: rule.iter().map(point).collect() }
+        };
+        basis.breaks().windows(2).map(span).collect()
+    }
 }
 
 /// The shells of `surface`, numbered by their lowest patches, those without patches by their lowest faces.
@@ -88,7 +105,8 @@ pub fn shells(surface: &SplineSurface) -> Vec<Shell> {
             .chain(of_faces)
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
         let center = (low + high) / 2.0;
-        let under_patches: f64 = patches.iter().map(|&p| volume(&surface.patches[p], center)).sum();
+        let under_each: Vec<f64> = patches.par_iter().map(|&p| volume(&surface.patches[p], center)).collect();
+        let under_patches: f64 = under_each.into_iter().sum();
         let under_faces: f64 = faces.iter().map(|&f| surface.faces[f].volume(&surface.edges, center)).sum();
         boxes.push((low, high));
         shells.push(Shell { patches, faces, volume: under_patches + under_faces, inside: None });

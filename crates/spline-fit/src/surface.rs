@@ -1,6 +1,6 @@
 //! The spline surface: vertices, edge curves and tensor-product patches that share them.
 
-use crate::basis::Basis;
+use crate::basis::{Basis, Local};
 use serde::{Deserialize, Serialize};
 use topipe_mesh::{DVec3, FeatureKind, RegionShape};
 
@@ -111,6 +111,12 @@ impl Patch {
         evaluate(&self.basis_u, &self.basis_v, &self.control, u, v)
     }
 
+    /// The same where the functions of [`Self::basis_u`] and [`Self::basis_v`] are known: on a grid those of each row and
+    /// column are needed once.
+    pub fn evaluate_at(&self, u: &Local, v: &Local) -> SurfacePoint {
+        evaluate_at(u, v, &self.control, self.basis_u.len())
+    }
+
     /// The parameters of the point at fraction `t` of side `side`, in the direction of the patch.
     pub fn side_parameters(side: usize, t: f64) -> (f64, f64) {
         match side {
@@ -124,8 +130,10 @@ impl Patch {
 
 /// Position and first derivatives of a tensor-product spline, control points with u fastest.
 pub(crate) fn evaluate(basis_u: &Basis, basis_v: &Basis, control: &[DVec3], u: f64, v: f64) -> SurfacePoint {
-    let (bu, bv) = (basis_u.evaluate(u), basis_v.evaluate(v));
-    let width = basis_u.len();
+    evaluate_at(&basis_u.evaluate(u), &basis_v.evaluate(v), control, basis_u.len())
+}
+
+fn evaluate_at(bu: &Local, bv: &Local, control: &[DVec3], width: usize) -> SurfacePoint {
     let (mut position, mut du, mut dv) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     for j in 0..bv.count {
         let row = (bv.first + j) * width + bu.first;

@@ -37,6 +37,7 @@ pub(crate) fn fit(
         samples.iter().map(|s| s.samples.iter().map(|s| [s.u, s.v]).collect()).collect();
     let patches = Patches { setting: &setting, parameters, units, progress };
     let mut before: Vec<Fitted> = Vec::new();
+    let mut known = Vec::new();
     loop {
         progress.check()?;
         // Each refinement starts from the same parameters: what a patch becomes does not depend on the way there.
@@ -45,7 +46,8 @@ pub(crate) fn fit(
                 [sample.u, sample.v] = *place;
             }
         }
-        let network = network(&setting, &samples, refinement.spans(), &refinement.reach(&setting))?;
+        let network =
+            network(&setting, &samples, refinement.spans(), &refinement.reach(&setting), &mut known)?;
         let mut fitted = patches.fit(&mut samples, &network, refinement.spans(), before)?;
         if !refinement.next(&setting, &network, &fitted, &samples, progress) {
             patches.draw_nearer(&mut fitted, &mut samples)?;
@@ -68,7 +70,8 @@ pub(crate) fn first_patches(
     let mut setting = Setting::new(layout)?;
     setting.make_corners(samples, parameters.spans as usize, &progress);
     let refinement = Refinement::new(&setting, parameters);
-    let network = network(&setting, samples, refinement.spans(), &refinement.reach(&setting))?;
+    let network =
+        network(&setting, samples, refinement.spans(), &refinement.reach(&setting), &mut Vec::new())?;
     let patches = Patches { setting: &setting, parameters, units: &Units::none(), progress: &progress };
     let (borders, corners) = patches.given(&network, refinement.spans());
     Ok(patches.keys(samples, &borders, &corners))

@@ -24,6 +24,7 @@ pub use spelling::{real, references, text};
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
+use spelling::{push_number, push_real};
 use std::io::{self, Write};
 
 /// Which application protocol a file follows. The geometry is the same in both.
@@ -81,6 +82,8 @@ pub struct Entities<'a, W: Write> {
     units: u64,
     /// Points by their coordinates: what is the same place bit for bit is one entity.
     points: FxHashMap<[u64; 3], u64>,
+    /// A line that is being put together.
+    line: String,
     plane_context: Option<u64>,
 }
 
@@ -100,6 +103,7 @@ impl<'a, W: Write> Entities<'a, W> {
             shape: 0,
             units: 0,
             points: FxHashMap::default(),
+            line: String::new(),
             plane_context: None,
         };
         let name = &file.name.clone();
@@ -142,7 +146,19 @@ impl<'a, W: Write> Entities<'a, W> {
         if let Some(&id) = self.points.get(&key) {
             return Ok(id);
         }
-        let id = self.add(&format!("CARTESIAN_POINT('',({},{},{}))", real(p.x), real(p.y), real(p.z)))?;
+        let id = self.next;
+        self.next += 1;
+        let line = &mut self.line;
+        line.clear();
+        line.push('#');
+        push_number(line, id);
+        line.push_str("=CARTESIAN_POINT('',(");
+        for (k, x) in p.to_array().into_iter().enumerate() {
+            line.push_str(if k > 0 { "," } else { "" });
+            push_real(line, x);
+        }
+        line.push_str("));\n");
+        self.out.write_all(line.as_bytes())?;
         self.points.insert(key, id);
         Ok(id)
     }

@@ -1,19 +1,43 @@
 //! How values are spelled.
 
+use std::fmt::Write;
+
 /// A list of entities.
 pub fn references(ids: &[u64]) -> String {
-    let list: Vec<String> = ids.iter().map(|id| format!("#{id}")).collect();
-    format!("({})", list.join(","))
+    // Room for seven digits each.
+    let mut list = String::with_capacity(9 * ids.len() + 2);
+    list.push('(');
+    for (k, id) in ids.iter().enumerate() {
+        list.push_str(if k > 0 { ",#" } else { "#" });
+        push_number(&mut list, *id);
+    }
+    list.push(')');
+    list
 }
 
 /// A number as the standard wants it: with a decimal point, exponent as E. Reads back to the same bits.
 pub fn real(x: f64) -> String {
-    let shortest = format!("{x:?}");
-    match shortest.split_once('e') {
-        None => shortest,
-        Some((mantissa, exponent)) if mantissa.contains('.') => format!("{mantissa}E{exponent}"),
-        Some((mantissa, exponent)) => format!("{mantissa}.E{exponent}"),
+    let mut text = String::new();
+    push_real(&mut text, x);
+    text
+}
+
+/// [`real`] at the end of `line`. A file of some hundred thousand points is hardly more than this.
+pub(crate) fn push_real(line: &mut String, x: f64) {
+    let start = line.len();
+    // Writing to a string does not fail.
+    let _ = write!(line, "{x:?}");
+    // Exponents are rare.
+    if let Some(place) = line[start..].find('e') {
+        let has_point = line[start..start + place].contains('.');
+        line.replace_range(start + place..start + place + 1, if has_point { "E" } else { ".E" });
     }
+}
+
+/// A whole number at the end of `line`.
+pub(crate) fn push_number(line: &mut String, n: u64) {
+    // Writing to a string does not fail.
+    let _ = write!(line, "{n}");
 }
 
 /// A string for a STEP file: quotes doubled, anything but printable ASCII as its code point.
@@ -43,6 +67,15 @@ mod tests {
             assert_eq!(written.parse::<f64>().unwrap().to_bits(), x.to_bits());
         }
         assert_eq!(real(1e-7), "1.E-7");
+    }
+
+    #[test]
+    fn what_is_pushed_leaves_the_line_before_it() {
+        let mut line = String::from("1e5,");
+        [-1.5e-7, 2.0, 3e20].into_iter().for_each(|x| push_real(&mut line, x));
+        push_number(&mut line, 12);
+        assert_eq!(line, "1e5,-1.5E-72.03.E2012");
+        assert_eq!(references(&[1, 23]), "(#1,#23)");
     }
 
     #[test]

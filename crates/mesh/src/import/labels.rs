@@ -48,7 +48,7 @@ impl Space {
                 let off = (p - *point - *axis * along).length();
                 (-slack..=length + slack).contains(&along) && off <= radius + slack
             }
-            Self::Mesh(index) => index.nearest_within(p, slack).is_some() || index.contains(p),
+            Self::Mesh(index) => index.is_within(p, slack) || index.contains(p),
         }
     }
 }

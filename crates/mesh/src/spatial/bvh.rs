@@ -182,8 +182,20 @@ impl SurfaceIndex {
         self.nearest_within(point, f64::INFINITY)
     }
 
+    /// Whether the surface is no farther from `point` than `limit`: what [`Self::nearest_within`] finds, but any such place ends
+    /// the search.
+    pub fn is_within(&self, point: DVec3, limit: f64) -> bool {
+        self.descend(point, limit, true).is_some()
+    }
+
     /// As [`Self::nearest`], but `None` where the surface is farther away than `limit`.
     pub fn nearest_within(&self, point: DVec3, limit: f64) -> Option<NearestPoint> {
+        self.descend(point, limit, false)
+    }
+
+    /// The nearest point within `limit`, or `any`.
+    #[inline]
+    fn descend(&self, point: DVec3, limit: f64, any: bool) -> Option<NearestPoint> {
         let root = self.root?;
         if !point.is_finite() {
             return None;
@@ -208,6 +220,9 @@ impl SurfaceIndex {
                     if d < best || (d == best && found.is_none_or(|(_, f)| face < f)) {
                         best = d;
                         found = Some((q, face));
+                        if any {
+                            return Some(NearestPoint { distance: d.sqrt(), point: q, face });
+                        }
                     }
                 }
                 continue;

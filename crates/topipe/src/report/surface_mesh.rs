@@ -5,7 +5,7 @@
 //! shape are cut up to a chord.
 
 use topipe_mesh::{DVec3, TriangleMesh, VertexId};
-use topipe_spline_fit::SplineSurface;
+use topipe_spline_fit::{Basis, SplineSurface};
 
 /// Triangles of all patches together that are aimed at: fine enough for a screen, and a few hundred kilobytes.
 const TRIANGLES: usize = 80_000;
@@ -32,11 +32,11 @@ pub(super) fn surface_mesh(surface: &SplineSurface) -> (TriangleMesh, Vec<u32>) 
     let n = grid(surface);
     for (id, patch) in surface.patches.iter().enumerate() {
         let first = mesh.positions.len();
-        for j in 0..=n {
-            for i in 0..=n {
-                let (u, v) = (i as f64 / n as f64, j as f64 / n as f64);
-                mesh.positions.push(patch.evaluate(u, v).position);
-            }
+        let along =
+            |basis: &Basis| -> Vec<_> { (0..=n).map(|k| basis.evaluate(k as f64 / n as f64)).collect() };
+        let columns = along(&patch.basis_u);
+        for row in along(&patch.basis_v) {
+            mesh.positions.extend(columns.iter().map(|column| patch.evaluate_at(column, &row).position));
         }
         let at = |i: usize, j: usize| VertexId::new(first + j * (n + 1) + i);
         for j in 0..n {

@@ -4,7 +4,7 @@ use crate::deviation::Surface;
 use rayon::prelude::*;
 use topipe_mesh::spatial::NearestPoint;
 use topipe_mesh::{DVec3, RegionShape, TriangleMesh, VertexId};
-use topipe_spline_fit::{Patch, SplineSurface};
+use topipe_spline_fit::{Basis, Patch, SplineSurface};
 
 /// Cells along a side of a patch.
 const CELLS: std::ops::RangeInclusive<usize> = 4..=128;
@@ -106,10 +106,15 @@ fn grid(patch: &Patch, spacing: f64) -> Grid {
         if count.is_finite() { (count as usize).clamp(*CELLS.start(), *CELLS.end()) } else { *CELLS.start() }
     });
     let mut points = Vec::with_capacity((cells[0] + 1) * (cells[1] + 1));
-    for j in 0..=cells[1] {
-        for i in 0..=cells[0] {
-            let uv = [i as f64 / cells[0] as f64, j as f64 / cells[1] as f64];
-            let s = patch.evaluate(uv[0], uv[1]);
+    let places = |cells: usize, basis: &Basis| -> Vec<_> {
+        let place = |k: usize| k as f64 / cells as f64;
+        (0..=cells).map(|k| (place(k), basis.evaluate(place(k)))).collect()
+    };
+    let (columns, rows) = (places(cells[0], &patch.basis_u), places(cells[1], &patch.basis_v));
+    for (j, (v, row)) in rows.iter().enumerate() {
+        for (i, (u, column)) in columns.iter().enumerate() {
+            let uv = [*u, *v];
+            let s = patch.evaluate_at(column, row);
             // The trapezoidal rule: points on a side stand for half a cell.
             let share = |k: usize, n: usize| if k == 0 || k == n { 0.5 } else { 1.0 } / n as f64;
             let area = s.du.cross(s.dv).length() * share(i, cells[0]) * share(j, cells[1]);
@@ -173,18 +178,18 @@ fn nearest_of_all(surface: &SplineSurface, boxes: &[[DVec3; 2]], p: DVec3, found
         if p.clamp(*low, *high).distance(p) >= best {
             continue;
         }
-        let places = |basis: &topipe_spline_fit::Basis| -> Vec<f64> {
+        let places = |basis: &Basis| -> Vec<_> {
             let breaks = basis.breaks();
             let inner = breaks
                 .windows(2)
                 .flat_map(|w| (0..SEARCH).map(move |k| w[0] + k as f64 / SEARCH as f64 * (w[1] - w[0])));
-            inner.chain([1.0]).collect()
+            inner.chain([1.0]).map(|t| (t, basis.evaluate(t))).collect()
         };
         let (us, vs) = (places(&patch.basis_u), places(&patch.basis_v));
         let nearest = us
             .iter()
-            .flat_map(|&u| vs.iter().map(move |&v| [u, v]))
-            .map(|uv| (patch.evaluate(uv[0], uv[1]).position.distance_squared(p), uv))
+            .flat_map(|(u, column)| vs.iter().map(move |(v, row)| ([*u, *v], column, row)))
+            .map(|(uv, column, row)| (patch.evaluate_at(column, row).position.distance_squared(p), uv))
             .min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, start)) = nearest {
             best = best.min(distance(patch, p, start));
@@ -196,7 +201,7 @@ fn nearest_of_all(surface: &SplineSurface, boxes: &[[DVec3; 2]], p: DVec3, found
 #[cfg(test)]
 mod tests {
     use super::*;
-    use topipe_spline_fit::{Basis, PatchSide};
+    use topipe_spline_fit::PatchSide;
 
     #[test]
     fn points_off_a_curved_patch_find_their_foot() {

@@ -55,12 +55,15 @@ pub fn volume_by_quadrature(surface: &SplineSurface) -> f64 {
         .patches
         .par_iter()
         .map(|patch| {
-            let nodes = |basis: &Basis| composite(basis, (3 * basis.degree()).div_ceil(2));
+            let nodes = |basis: &Basis| -> Vec<_> {
+                let nodes = composite(basis, (3 * basis.degree()).div_ceil(2));
+                nodes.into_iter().map(|(t, weight)| (basis.evaluate(t), weight)).collect()
+            };
             let (u, v) = (nodes(&patch.basis_u), nodes(&patch.basis_v));
             let mut sum = 0.0;
-            for &(v, weight_v) in &v {
-                for &(u, weight_u) in &u {
-                    let s = patch.evaluate(u, v);
+            for (v, weight_v) in &v {
+                for (u, weight_u) in &u {
+                    let s = patch.evaluate_at(u, v);
                     sum += weight_u * weight_v * (s.position - center).dot(s.du.cross(s.dv));
                 }
             }
