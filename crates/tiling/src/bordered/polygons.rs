@@ -1,4 +1,4 @@
-//! Tiles with many sides, with a reflex corner, or that bend too much, are divided.
+//! Tiles with many sides, with a reflex corner, around the point of a region, or that bend too much, are divided.
 //!
 //! The layout joins the centre of a tile to the middles of its sides, so that of n sides leave corners of 360 / n degrees
 //! there. The cut runs between two stations of the border: a corner, whose angle it halves, or the middle of a side that
@@ -8,7 +8,7 @@ use super::Construction;
 use super::check::{Outline, Stamps, normal_cone, outline, slenderness};
 use crate::TilingError;
 use std::collections::BTreeMap;
-use topipe_mesh::FaceId;
+use topipe_mesh::{FaceId, HalfEdgeId};
 
 /// Tiles with more sides are divided.
 const MOST_SIDES: usize = 9;
@@ -20,10 +20,23 @@ const MIDDLE: f64 = 2.3; // 130 degrees
 const WIDE: f64 = 3.5; // 200 degrees
 /// Tiles with a wider corner between two barriers are cut from it: one quad would lie in it.
 const WIDEST: f64 = 2.8; // 160 degrees
+/// A region that comes to a point of less than this angle, and one quad below it with both its sides, are a lip: a coarse mesh has
+/// the same triangle in the corner of both, as gmsh's of the bridge. A cut from the point leaves two quads there.
+const POINTED: f64 = 2.1; // 120 degrees
+/// Corners narrower than this are not cut in two.
+const LEAST_LIP: f64 = 0.7; // 40 degrees
+/// Such a corner is cut like one of this angle.
+const LIP: f64 = 1.01 * WIDEST;
 /// What each side costs that one part has more than the other.
 const UNEVEN: f64 = 0.15;
 /// Tiles more slender than this (see [`slenderness`]) are cut across.
 const SLENDER: f64 = 48.0;
+/// With more sides than [`FEW_SIDES`] these are: several of them crowd at an end, and the quads that reach there from the centre
+/// are needles. Corners outside 15 to 165 degrees and crossings of the triangulated surface on bell-crank, bracket, support and
+/// bridge: 18 and 680 without this limit, 14 and 662 with 42, 2 and 266 with 36 (a fifth more patches), 12 and 115 with 32 (three
+/// fifths more).
+const LESS_SLENDER: f64 = 36.0;
+const FEW_SIDES: usize = 4;
 /// Unless they cover less than this, in squares of the local size: slivers between regions stay in one piece.
 const LEAST_SLENDER_AREA: f64 = 0.01;
 /// What it costs there that one part has all the border.
@@ -64,8 +77,8 @@ impl Construction<'_> {
                 .map(|&f| mesh.area_vector(f).length() / 2.0 / surface.size[f.index()].powi(2))
                 .sum();
             let bent = area >= LEAST_AREA && normal_cone(surface, faces).0 > limit;
-            let slender =
-                area >= LEAST_SLENDER_AREA && slenderness(surface, faces, &outline.border) > SLENDER;
+            let most = if outline.corners.len() > FEW_SIDES { LESS_SLENDER } else { SLENDER };
+            let slender = area >= LEAST_SLENDER_AREA && slenderness(surface, faces, &outline.border) > most;
             let stations = self.stations(&outline);
             let mut wide = None;
             for (i, station) in stations.iter().enumerate() {
@@ -105,10 +118,15 @@ impl Construction<'_> {
             }
             let before = border[(start + border.len() - 1) % border.len()];
             let between_barriers = surface.is_barrier(border[start]) && surface.is_barrier(before);
+            let fixed_angle = match between_barriers {
+                true if angle > LEAST_LIP && self.is_lip(border[start]) => angle.max(LIP),
+                true => angle,
+                false => 0.0,
+            };
             stations.push(Station {
                 at: start,
                 value: angle.min(WIDE),
-                fixed_angle: if between_barriers { angle } else { 0.0 },
+                fixed_angle,
                 along: reach[start],
                 sides: i as f64,
             });
@@ -134,6 +152,25 @@ impl Construction<'_> {
             }
         }
         stations
+    }
+
+    /// Whether a region comes to a point at the corner of a tile that `start` leaves, and the tile is all that is around it.
+    fn is_lip(&self, start: HalfEdgeId) -> bool {
+        let surface = &self.surface;
+        let tile = surface.owner[start.face().index()];
+        let mut region = None;
+        let mut angle = 0.0;
+        for h in surface.refiner.outgoing(surface.refiner.origin(start)) {
+            let f = h.face().index();
+            if surface.owner[f] != tile {
+                if surface.is_free(h.face()) || *region.get_or_insert(surface.region[f]) != surface.region[f]
+                {
+                    return false;
+                }
+                angle += surface.angle(h);
+            }
+        }
+        angle < POINTED
     }
 
     /// Cuts the tile between two of its stations, one of them `through` if that is given.
