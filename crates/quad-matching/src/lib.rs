@@ -18,6 +18,7 @@
 
 mod doublets;
 mod dual;
+mod ends;
 mod error;
 mod layout;
 mod matching;

@@ -3,6 +3,7 @@
 //! Each tile of n sides becomes n quads: its centre is joined to the middles of its sides. That needs no matching and no
 //! even count, works with borders, and leaves corners of 360 / n degrees at centres and about 90 at middles.
 
+use crate::ends::turn_ends;
 use crate::outlines::outlines;
 use crate::refine::{Quads, Regions, refine};
 use crate::relax::relax;
@@ -35,6 +36,10 @@ pub(crate) fn subdivide(
         if changed == 0 {
             break;
         }
+    }
+    let turned = turn_ends(&mut fine);
+    if turned > 0 {
+        progress.remark(&format!("ends of edges turned {turned} times beside corners outside the gates"));
     }
     let Regions { tiled, vertices, edges, .. } = fine;
     let quad_of_face = tiled.tile_of_face;

@@ -28,7 +28,7 @@ const FREE: f64 = 0.52; // 30 degrees
 const STEEP: f64 = 1.13; // 65 degrees
 
 /// What an angle at a corner costs.
-fn cost(angle: f64) -> f64 {
+pub(crate) fn cost(angle: f64) -> f64 {
     let off = (angle - FRAC_PI_2).abs();
     (off - FREE).max(0.0).powi(2) + 100.0 * (off - STEEP).max(0.0).powi(2)
 }
