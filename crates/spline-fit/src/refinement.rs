@@ -43,6 +43,19 @@ pub(crate) struct Refinement {
     tolerance: f64,
     /// Of the mesh; built when it is first needed.
     index: Option<SurfaceIndex>,
+    /// Edges beside folded patches whose local fits reach as far as at first again; empty until that is tried.
+    eased: Vec<Eased>,
+    /// Rounds of easing that are left.
+    easing: u32,
+}
+
+/// An edge whose local fits reach as far as at first again.
+struct Eased {
+    edge: usize,
+    /// The factor on their radii that it had.
+    closer: f64,
+    /// How much the patches around its ends were folded then.
+    folded: f64,
 }
 
 impl Refinement {
@@ -53,6 +66,8 @@ impl Refinement {
             closer: vec![1.0; setting.layout.edges.len()],
             tolerance: parameters.largest_distance(&setting.layout.part.mesh),
             index: None,
+            eased: Vec::new(),
+            easing: 2,
         }
     }
 
@@ -75,6 +90,10 @@ impl Refinement {
         samples: &[PatchSamples],
         progress: &Progress,
     ) -> bool {
+        // Only easing is left.
+        if self.rounds == 0 && !self.eased.is_empty() {
+            return false;
+        }
         let residuals: Vec<f64> =
             samples.par_iter().zip(fitted).map(|(samples, fitted)| fitted.net.farthest(samples)).collect();
         progress.remark(&format!(
@@ -115,6 +134,96 @@ impl Refinement {
             }
         }
         changed
+    }
+
+    /// After the last refinement: in the first round the local fits along the edges of folded patches reach as far as at
+    /// first again; in the second those are put back that have unfolded nothing. False when nothing changes.
+    pub(crate) fn ease(
+        &mut self,
+        setting: &Setting<'_>,
+        fitted: &[Fitted],
+        samples: &[PatchSamples],
+        progress: &Progress,
+    ) -> bool {
+        if self.easing == 0 {
+            return false;
+        }
+        self.easing -= 1;
+        let around = Around::new(setting, |e| self.closer[e] < 1.0 || self.eased.iter().any(|x| x.edge == e));
+        let folded = around.folded(fitted, samples);
+        if self.easing == 0 {
+            let mut restored = 0;
+            for eased in &self.eased {
+                if around.sum(setting, eased.edge, &folded) >= eased.folded {
+                    self.closer[eased.edge] = eased.closer;
+                    restored += 1;
+                }
+            }
+            return restored > 0;
+        }
+        let mut beside = vec![false; self.closer.len()];
+        for (sides, _) in setting.layout.quads.iter().zip(&folded).filter(|(_, share)| **share > 0.0) {
+            sides.iter().for_each(|side| beside[side.edge as usize] = true);
+        }
+        for edge in (0..beside.len()).filter(|&e| beside[e]) {
+            if self.closer[edge] >= 1.0 {
+                continue;
+            }
+            let folded = around.sum(setting, edge, &folded);
+            self.eased.push(Eased { edge, closer: self.closer[edge], folded });
+            self.closer[edge] = 1.0;
+        }
+        progress.remark(&format!(
+            "{} edges beside folded patches follow the mesh less closely",
+            self.eased.len()
+        ));
+        !self.eased.is_empty()
+    }
+}
+
+/// The patches around the ends of some edges.
+struct Around {
+    /// Per vertex, ascending; empty where no such edge ends.
+    quads: Vec<Vec<usize>>,
+    /// Whether a patch is among them.
+    looked_at: Vec<bool>,
+}
+
+impl Around {
+    fn new(setting: &Setting<'_>, edges: impl Fn(usize) -> bool) -> Self {
+        let layout = setting.layout;
+        let mut ends = vec![false; layout.vertices.len()];
+        for (e, edge) in layout.edges.iter().enumerate() {
+            if edges(e) {
+                edge.ends.iter().for_each(|&v| ends[v as usize] = true);
+            }
+        }
+        let mut quads = vec![Vec::new(); layout.vertices.len()];
+        let mut looked_at = vec![false; layout.quads.len()];
+        for quad in 0..layout.quads.len() {
+            for v in layout.corners(quad) {
+                if ends[v as usize] {
+                    quads[v as usize].push(quad);
+                    looked_at[quad] = true;
+                }
+            }
+        }
+        Self { quads, looked_at }
+    }
+
+    /// The share of each patch that is turned over; 0 for those not looked at.
+    fn folded(&self, fitted: &[Fitted], samples: &[PatchSamples]) -> Vec<f64> {
+        let share = |quad: usize| fitted[quad].net.folded(&fitted[quad].corners, &samples[quad]);
+        (0..fitted.len()).into_par_iter().map(|q| if self.looked_at[q] { share(q) } else { 0.0 }).collect()
+    }
+
+    /// How much the patches around the ends of an edge are folded together.
+    fn sum(&self, setting: &Setting<'_>, edge: usize, folded: &[f64]) -> f64 {
+        let mut quads: Vec<usize> =
+            setting.layout.edges[edge].ends.iter().flat_map(|&v| &self.quads[v as usize]).copied().collect();
+        quads.sort_unstable();
+        quads.dedup();
+        quads.into_iter().map(|quad| folded[quad]).sum()
     }
 }
 

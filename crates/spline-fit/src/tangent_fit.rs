@@ -49,7 +49,9 @@ pub(crate) fn fit(
         let network =
             network(&setting, &samples, refinement.spans(), &refinement.reach(&setting), &mut known)?;
         let mut fitted = patches.fit(&mut samples, &network, refinement.spans(), before)?;
-        if !refinement.next(&setting, &network, &fitted, &samples, progress) {
+        if !refinement.next(&setting, &network, &fitted, &samples, progress)
+            && !refinement.ease(&setting, &fitted, &samples, progress)
+        {
             patches.draw_nearer(&mut fitted, &mut samples)?;
             let nets = insert_knots(&setting, &network.curves, &fitted, parameters.max_normal_jump, progress);
             let mut surface = assemble(&setting, network, nets);

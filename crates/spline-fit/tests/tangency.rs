@@ -74,6 +74,9 @@ fn patches_of_a_real_part_meet_with_a_common_tangent_plane() {
     let surface = fit(&layout, &Parameters::default(), &Units::none(), &Progress::silent()).unwrap();
     assert!(surface.patches.len() > 300 && surface.faces.len() > 4);
     assert!(largest_jump(&surface) < 0.1, "{} degrees", largest_jump(&surface));
+    // Nor do they pass through each other; at sharp ridges seven pairs of triangles did while curves followed the mesh too closely.
+    let (mesh, _) = surface.tessellate_with(2e-3 * layout.part.mesh.diagonal(), f64::INFINITY);
+    assert_eq!(topipe_mesh::spatial::crossings(&mesh).len(), 0);
 }
 
 #[test]
