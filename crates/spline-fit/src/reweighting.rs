@@ -10,7 +10,7 @@
 
 use crate::SplineFitError;
 use crate::patch_fit::Net;
-use crate::patches::{Fitted, PatchTask, Patches, grams, places, put};
+use crate::patches::{Fitted, PatchTask, Patches, TIP, grams, places, put};
 use crate::samples::PatchSamples;
 use rayon::prelude::*;
 
@@ -18,8 +18,6 @@ use rayon::prelude::*;
 const ROUNDS: usize = 8;
 /// By as much the weight of a sample grows at most each time; by the root of it after a patch that turned over.
 const HEAVIER: f64 = 4.0;
-/// Share of the points of a patch that may be turned over: the very tip of a spike.
-const TIP: f64 = 1e-3;
 /// How much farther than before a patch may swing out between its samples, over the tolerance.
 const SWING: f64 = 0.5;
 /// Fits that bring nothing before a patch is left as it was.
