@@ -11,6 +11,7 @@
 
 use crate::{FaceId, TriangleMesh, VertexId};
 use glam::{DVec2, DVec3};
+use multiversion::multiversion;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -28,8 +29,13 @@ pub struct DiskMap {
 impl DiskMap {
     /// Maps the vertices of `faces`: those in `fixed` to the given places, the others to the mean-value combination
     /// of their neighbours. `None` when some vertex has no path to a fixed one or the numbers overflow.
-    pub fn solve(mesh: &TriangleMesh, faces: &[FaceId], fixed: &FxHashMap<VertexId, DVec2>) -> Option<Self> {
-        DiskSystem::new(mesh, faces, |v| fixed.contains_key(&v))?.solve(|v| fixed.get(&v).copied())
+    pub fn solve(
+        mesh: &TriangleMesh,
+        faces: &[FaceId],
+        fixed: &FxHashMap<VertexId, DVec2>,
+        numbers: &mut Numbers,
+    ) -> Option<Self> {
+        DiskSystem::new(mesh, faces, |v| fixed.contains_key(&v), numbers)?.solve(|v| fixed.get(&v).copied())
     }
 
     /// Where `vertex` is mapped to; the origin if it does not belong to the disk.
@@ -54,6 +60,39 @@ impl DiskMap {
     /// The number of faces whose image was clockwise when the map was made.
     pub fn flipped(&self) -> usize {
         self.flipped
+    }
+}
+
+/// Memory in which the vertices of one disk after the other are numbered. Finding the number of a corner in a hash map took a
+/// third of the time of setting up the equations.
+#[derive(Debug, Default)]
+pub struct Numbers {
+    /// Of each vertex when it was numbered, and its number then.
+    known: Vec<(u32, u32)>,
+    now: u32,
+}
+
+impl Numbers {
+    /// Forgets all numbers.
+    fn clear(&mut self, vertices: usize) {
+        if self.now == u32::MAX {
+            *self = Self::default();
+        }
+        self.now += 1;
+        if self.known.len() < vertices {
+            self.known.resize(vertices, (0, 0));
+        }
+    }
+
+    /// The number of a vertex, which is `next` if it has none, and whether it had none.
+    #[inline]
+    fn of(&mut self, v: VertexId, next: u32) -> (u32, bool) {
+        let slot = &mut self.known[v.index()];
+        if slot.0 == self.now {
+            return (slot.1, false);
+        }
+        *slot = (self.now, next);
+        (next, true)
     }
 }
 
@@ -112,19 +151,24 @@ impl<T: Copy + Default> Csr<T> {
 impl DiskSystem {
     /// The equations for the vertices of `faces` that are not `fixed`. `None` when some vertex has no path to a fixed one or the
     /// numbers overflow.
-    pub fn new(mesh: &TriangleMesh, faces: &[FaceId], fixed: impl Fn(VertexId) -> bool) -> Option<Self> {
-        let mut number: FxHashMap<VertexId, u32> =
-            FxHashMap::with_capacity_and_hasher(faces.len(), Default::default());
+    pub fn new(
+        mesh: &TriangleMesh,
+        faces: &[FaceId],
+        fixed: impl Fn(VertexId) -> bool,
+        numbers: &mut Numbers,
+    ) -> Option<Self> {
+        numbers.clear(mesh.vertex_count());
         let (mut vertices, mut rows, mut free) = (Vec::new(), Vec::new(), 0u32);
         let mut corners = Vec::with_capacity(faces.len());
         for &face in faces {
             corners.push(mesh.triangles[face.index()].map(|v| {
-                *number.entry(v).or_insert_with(|| {
+                let (number, is_new) = numbers.of(v, vertices.len() as u32);
+                if is_new {
                     vertices.push(v);
                     rows.push(if fixed(v) { FIXED } else { free });
                     free += u32::from(rows[rows.len() - 1] != FIXED);
-                    vertices.len() as u32 - 1
-                })
+                }
+                number
             }));
         }
         let mut items: Vec<(u32, (u32, f64))> = Vec::with_capacity(6 * faces.len());
@@ -176,7 +220,7 @@ impl DiskSystem {
         matrix.factor()?;
         rows.iter_mut().filter(|row| **row != FIXED).for_each(|row| *row = place[*row as usize]);
         let borders = Csr::new(order.len(), &border_items);
-        let numbers = Arc::new(number);
+        let numbers = Arc::new(vertices.iter().copied().zip(0..).collect());
         Some(Self { vertices, numbers, corners, rows, borders, matrix })
     }
 
@@ -307,30 +351,7 @@ impl Envelope {
     /// vertices that hardly hangs on to the rest would have no place. Pivots take the place of the diagonal, factors that
     /// of the columns before it.
     fn factor(&mut self) -> Option<()> {
-        for k in 0..self.columns.len() {
-            let [first, last] = self.columns[k].map(|c| c as usize);
-            let (done, rest) = self.values.split_at_mut(self.start[k + 1]);
-            let row = &mut done[self.start[k]..];
-            let (diagonal, after) = row[k - first..].split_at_mut(1);
-            let pivot = self.absorbed[k] + after.iter().sum::<f64>();
-            if !(pivot > 0.0 && pivot.is_finite()) {
-                return None;
-            }
-            diagonal[0] = pivot;
-            for i in k + 1..=last {
-                let at = self.start[i] - self.start[k + 1] + k - self.columns[i][0] as usize;
-                let (factor, own) = rest[at..][..last - k + 1].split_at_mut(1);
-                factor[0] /= pivot;
-                let factor = factor[0];
-                if factor == 0.0 {
-                    continue;
-                }
-                // The diagonal of row i gets something too; its pivot will take the place of it.
-                own.iter_mut().zip(&*after).for_each(|(own, value)| *own += factor * value);
-                self.absorbed[i] += factor * self.absorbed[k];
-            }
-        }
-        Some(())
+        eliminate(&self.columns, &self.start, &mut self.values, &mut self.absorbed)
     }
 
     /// Solves in place.
@@ -361,6 +382,46 @@ impl Envelope {
         }
         Some(())
     }
+}
+
+/// The same additions in the same order for every kind of processor: the bits are the same. Wider registers take a third off its
+/// time for the layout of the bracket divided to 300,000 triangles (0.35 s instead of 0.55 s).
+#[multiversion(targets("x86_64+avx2"))]
+fn eliminate(columns: &[[u32; 2]], start: &[usize], values: &mut [f64], absorbed: &mut [f64]) -> Option<()> {
+    eliminate_rows(columns, start, values, absorbed)
+}
+
+#[inline(always)]
+fn eliminate_rows(
+    columns: &[[u32; 2]],
+    start: &[usize],
+    values: &mut [f64],
+    absorbed: &mut [f64],
+) -> Option<()> {
+    for k in 0..columns.len() {
+        let [first, last] = columns[k].map(|c| c as usize);
+        let (done, rest) = values.split_at_mut(start[k + 1]);
+        let row = &mut done[start[k]..];
+        let (diagonal, after) = row[k - first..].split_at_mut(1);
+        let pivot = absorbed[k] + after.iter().sum::<f64>();
+        if !(pivot > 0.0 && pivot.is_finite()) {
+            return None;
+        }
+        diagonal[0] = pivot;
+        for i in k + 1..=last {
+            let at = start[i] - start[k + 1] + k - columns[i][0] as usize;
+            let (factor, own) = rest[at..][..last - k + 1].split_at_mut(1);
+            factor[0] /= pivot;
+            let factor = factor[0];
+            if factor == 0.0 {
+                continue;
+            }
+            // The diagonal of row i gets something too; its pivot will take the place of it.
+            own.iter_mut().zip(&*after).for_each(|(own, value)| *own += factor * value);
+            absorbed[i] += factor * absorbed[k];
+        }
+    }
+    Some(())
 }
 
 #[cfg(test)]
@@ -406,7 +467,7 @@ mod tests {
             }
         }
         let faces: Vec<FaceId> = mesh.faces().collect();
-        let map = DiskMap::solve(&mesh, &faces, &border(&mesh)).unwrap();
+        let map = DiskMap::solve(&mesh, &faces, &border(&mesh), &mut Numbers::default()).unwrap();
         for v in mesh.vertices() {
             assert!(map.at(v).distance(mesh.position(v).truncate()) < 1e-12);
         }
@@ -416,7 +477,7 @@ mod tests {
     fn is_one_to_one_on_a_steep_bump() {
         let mesh = grid(16, |x, y| 3.0 * (-40.0 * ((x - 0.4).powi(2) + (y - 0.6).powi(2))).exp());
         let faces: Vec<FaceId> = mesh.faces().collect();
-        let map = DiskMap::solve(&mesh, &faces, &border(&mesh)).unwrap();
+        let map = DiskMap::solve(&mesh, &faces, &border(&mesh), &mut Numbers::default()).unwrap();
         assert_eq!(map.flipped(), 0);
         let area: f64 = faces
             .iter()
@@ -429,9 +490,29 @@ mod tests {
     }
 
     #[test]
+    fn wider_registers_change_no_bit() {
+        let n = 60;
+        let columns: Vec<[u32; 2]> =
+            (0..n).map(|k: u32| [k.saturating_sub(13), (k + 13).min(n - 1)]).collect();
+        let mut start = vec![0];
+        columns
+            .iter()
+            .for_each(|[first, last]| start.push(start[start.len() - 1] + (last - first + 1) as usize));
+        let weight = |k: usize| 1.0 + (1.7 * k as f64).sin();
+        let mut values: Vec<f64> = (0..start[n as usize]).map(weight).collect();
+        let mut absorbed: Vec<f64> = (0..n as usize).map(|k| weight(3 * k)).collect();
+        let (mut plain, mut plain_absorbed) = (values.clone(), absorbed.clone());
+        eliminate(&columns, &start, &mut values, &mut absorbed).unwrap();
+        eliminate_rows(&columns, &start, &mut plain, &mut plain_absorbed).unwrap();
+        let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&values), bits(&plain));
+        assert_eq!(bits(&absorbed), bits(&plain_absorbed));
+    }
+
+    #[test]
     fn without_fixed_vertices_there_is_no_map() {
         let mesh = grid(2, |_, _| 0.0);
         let faces: Vec<FaceId> = mesh.faces().collect();
-        assert!(DiskMap::solve(&mesh, &faces, &FxHashMap::default()).is_none());
+        assert!(DiskMap::solve(&mesh, &faces, &FxHashMap::default(), &mut Numbers::default()).is_none());
     }
 }

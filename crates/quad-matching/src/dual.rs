@@ -9,6 +9,7 @@ use crate::straighten::straighten;
 use crate::{MacroEdge, Pairing, Parameters, QuadLayout, QuadMatchingError, Side};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};
+use topipe_mesh::disk_map::Numbers;
 use topipe_mesh::{FaceId, HalfEdgeId, Part, VertexId};
 use topipe_progress::Progress;
 use topipe_tiling::Tiling;
@@ -219,7 +220,10 @@ fn cut_macro_edges(
         .collect();
     // Each map depends on its own tile alone, and cutting one tile leaves the faces of the others as they are.
     let shared = &*tiled;
-    let maps: Vec<_> = tasks.par_iter().map(|task| spokes::map(shared, task)).collect();
+    let maps: Vec<_> = tasks
+        .par_iter()
+        .map_init(Numbers::default, |numbers, task| spokes::map(shared, task, numbers))
+        .collect();
     let mut sites = Vec::with_capacity(tasks.len());
     let mut halves: BTreeMap<[u32; 2], [Vec<VertexId>; 2]> = BTreeMap::new();
     for (task, map) in tasks.iter().zip(maps) {

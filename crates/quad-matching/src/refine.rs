@@ -9,6 +9,7 @@ use crate::spokes::{self, SpokeTask};
 use crate::{MacroEdge, QuadMatchingError, Side};
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
+use topipe_mesh::disk_map::Numbers;
 use topipe_mesh::refine::Refiner;
 use topipe_mesh::{FaceId, HalfEdgeId, Provenance, VertexId};
 use topipe_progress::Progress;
@@ -152,7 +153,10 @@ pub(crate) fn refine(regions: Regions, snap: f64, progress: &Progress) -> Result
         })
         .collect();
     let shared = &tiled;
-    let maps: Vec<_> = tasks.par_iter().map(|task| spokes::map(shared, task)).collect();
+    let maps: Vec<_> = tasks
+        .par_iter()
+        .map_init(Numbers::default, |numbers, task| spokes::map(shared, task, numbers))
+        .collect();
     let mut spokes_of = Vec::with_capacity(tasks.len());
     let mut spoke_edges = Vec::new();
     for (task, map) in tasks.iter().zip(maps) {

@@ -227,7 +227,8 @@ fn relax_one(
     snap: f64,
     scratch: &mut Scratch,
 ) -> bool {
-    let Some(map) = star.map(&regions.tiled.refiner.part().mesh, plan).cloned() else { return false };
+    let mesh = &regions.tiled.refiner.part().mesh;
+    let Some(map) = star.map(mesh, plan, &mut scratch.numbers).cloned() else { return false };
     let Star { v, fan, ref members, ref ring, ref border, ref spokes, ref targets, ref faces, .. } = *star;
     let vertex = regions.vertices[v];
     let id = members[0] as u32;
@@ -296,7 +297,7 @@ fn fill(
 ) -> bool {
     let key = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];
     let Regions { tiled, edges, sides, .. } = regions;
-    let Scratch { inside, labelled, on_path } = scratch;
+    let Scratch { inside, labelled, on_path, .. } = scratch;
     let count = tiled.tile_of_face.len();
     inside.clear(count);
     faces.iter().for_each(|f| _ = inside.set(f.index()));

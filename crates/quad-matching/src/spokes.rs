@@ -12,7 +12,7 @@ use glam::DVec2;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::{BTreeSet, VecDeque};
 use std::f64::consts::{PI, TAU};
-use topipe_mesh::disk_map::DiskMap;
+use topipe_mesh::disk_map::{DiskMap, Numbers};
 use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
 
 /// A tile with its border and the spokes that are already fixed.
@@ -29,7 +29,7 @@ pub(crate) struct SpokeTask {
 }
 
 /// Plane coordinates of the tile's vertices; computed for many tiles at once, before any of them is cut.
-pub(crate) fn map(tiled: &Tiled, task: &SpokeTask) -> Option<DiskMap> {
+pub(crate) fn map(tiled: &Tiled, task: &SpokeTask, numbers: &mut Numbers) -> Option<DiskMap> {
     let mesh = &tiled.refiner.part().mesh;
     let n = task.border.len();
     let mut along = vec![0.0];
@@ -88,7 +88,7 @@ pub(crate) fn map(tiled: &Tiled, task: &SpokeTask) -> Option<DiskMap> {
             fixed.insert(v, end * (reach[k] / reach[reach.len() - 1]));
         }
     }
-    DiskMap::solve(mesh, &task.faces, &fixed)
+    DiskMap::solve(mesh, &task.faces, &fixed, numbers)
 }
 
 /// Angles proportional to `share`, none above half a turn, all together a full turn.

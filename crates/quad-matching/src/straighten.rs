@@ -10,7 +10,7 @@ use crate::spokes::{self, SpokeTask};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
-use topipe_mesh::disk_map::DiskMap;
+use topipe_mesh::disk_map::{DiskMap, Numbers};
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
 use topipe_progress::Progress;
 
@@ -109,7 +109,7 @@ fn straighten_one(
             along += points[k].distance(points[k + 1]);
         }
     }
-    let Some(map) = DiskMap::solve(mesh, &faces, &fixed) else { return Ok(()) };
+    let Some(map) = DiskMap::solve(mesh, &faces, &fixed, &mut Numbers::default()) else { return Ok(()) };
     // A region much longer than wide crowds its far ends: there the straight line is no better than the old path.
     if map.flipped() > 0 {
         return Ok(());

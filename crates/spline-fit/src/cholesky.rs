@@ -1,5 +1,6 @@
 //! Cholesky factorization for the systems of the fit: dense ones of tens of unknowns, banded ones of thousands.
 
+use multiversion::multiversion;
 use topipe_mesh::DVec3;
 
 /// A symmetric matrix, lower triangle stored by rows.
@@ -141,8 +142,15 @@ impl Banded {
     }
 }
 
-/// In eight sums side by side, which the compiler turns into vector instructions; one sum would have to run in order.
+/// The same additions in the same order for every kind of processor.
+#[multiversion(targets("x86_64+avx2"))]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
+    plain_dot(a, b)
+}
+
+/// In eight sums side by side, which the compiler turns into vector instructions; one sum would have to run in order.
+#[inline(always)]
+fn plain_dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
     let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
@@ -191,6 +199,15 @@ mod tests {
             (0..n).map(|i| (0..n).map(|j| matrix.get(i, j) * exact[j]).sum()).collect();
         matrix.solve(&mut right).unwrap();
         assert!(right.iter().zip(&exact).all(|(a, b)| a.distance(*b) < 1e-10));
+    }
+
+    #[test]
+    fn wider_registers_change_no_bit() {
+        let list = |step: f64| (0..67).map(|k| (step * f64::from(k)).sin()).collect::<Vec<f64>>();
+        let (a, b) = (list(1.7), list(2.9));
+        for n in 0..a.len() {
+            assert_eq!(dot(&a[..n], &b[..n]).to_bits(), plain_dot(&a[..n], &b[..n]).to_bits());
+        }
     }
 
     #[test]

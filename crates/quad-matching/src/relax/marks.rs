@@ -1,5 +1,7 @@
 //! Memory that all attempts of a relaxation use in turn.
 
+use topipe_mesh::disk_map::Numbers;
+
 /// A set of small numbers that is emptied in no time: members are those with the stamp of now.
 #[derive(Debug, Default)]
 pub(super) struct Marks {
@@ -32,12 +34,13 @@ impl Marks {
     }
 }
 
-/// What is marked while regions are looked through, on faces and on vertices.
+/// What is marked while regions are looked through, on faces and on vertices, and the numbers of vertices in a map.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     pub(super) inside: Marks,
     pub(super) labelled: Marks,
     pub(super) on_path: Marks,
+    pub(super) numbers: Numbers,
 }
 
 #[cfg(test)]

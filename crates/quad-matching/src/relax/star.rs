@@ -10,7 +10,7 @@ use crate::sides::Tiled;
 use glam::{DMat2, DVec2};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::f64::consts::{PI, TAU};
-use topipe_mesh::disk_map::{DiskMap, DiskSystem};
+use topipe_mesh::disk_map::{DiskMap, DiskSystem, Numbers};
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, TriangleMesh, VertexId};
 
 /// A star as it is between attempts.
@@ -102,17 +102,18 @@ impl<'a> Star<'a> {
     }
 
     /// The map to the disk with the border as planned; none where there is none that is one-to-one.
-    pub(super) fn map(&mut self, mesh: &TriangleMesh, plan: Plan) -> Option<&DiskMap> {
+    pub(super) fn map(&mut self, mesh: &TriangleMesh, plan: Plan, numbers: &mut Numbers) -> Option<&DiskMap> {
         let at = plan as usize;
         if self.maps[at].is_none() {
-            self.maps[at] = Some(self.mapped(mesh, plan));
+            self.maps[at] = Some(self.mapped(mesh, plan, numbers));
         }
         self.maps[at].as_ref()?.as_ref()
     }
 
-    fn mapped(&mut self, mesh: &TriangleMesh, plan: Plan) -> Option<DiskMap> {
+    fn mapped(&mut self, mesh: &TriangleMesh, plan: Plan, numbers: &mut Numbers) -> Option<DiskMap> {
         let Self { fan, ref ring, ring_end, ref begins, ref border, ref faces, .. } = *self;
-        let system = self.system.get_or_insert_with(|| DiskSystem::new(mesh, faces, |v| border.contains(&v)));
+        let system =
+            self.system.get_or_insert_with(|| DiskSystem::new(mesh, faces, |v| border.contains(&v), numbers));
         let system = system.as_ref()?;
         let n = fan.corners.len();
         let sector = if fan.closed { TAU } else { 0.95 * PI };
