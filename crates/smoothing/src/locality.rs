@@ -9,6 +9,7 @@
 
 use crate::reorder::{breadth_first, inverse, sort_strips};
 use rayon::prelude::*;
+use topipe_mesh::spatial::along_curve;
 use topipe_mesh::{DVec3, FeatureEdge, Part, TriangleMesh, VertexId};
 
 /// Meshes with fewer vertices keep their numbering: four arrays of positions fit a second-level cache and a bit.
@@ -33,7 +34,7 @@ impl Order {
 
     fn breadth_first(mesh: &TriangleMesh) -> (Self, TriangleMesh) {
         // The faces of a file can have any order: they are looked at once to sort them along the curve, and from there on in that order.
-        let (curve, along) = Self::along(along_curve(mesh), &mesh.triangles, |v: &VertexId| v.0);
+        let (curve, along) = Self::along(along_curve(&mesh.positions), &mesh.triangles, |v: &VertexId| v.0);
         let (search, triangles) = Self::along(search(&along, curve.old.len()), &along, |v: &u32| *v);
         drop(along);
         // One after the other.
@@ -130,23 +131,6 @@ fn renumber_edges(edges: &[FeatureEdge], numbers: &[u32]) -> Vec<FeatureEdge> {
     edges
 }
 
-/// The vertices along a Morton curve.
-fn along_curve(mesh: &TriangleMesh) -> Vec<u32> {
-    let (low, high) = mesh.bounds();
-    let scale = 2_097_151.0 / (high - low).max_element().max(f64::MIN_POSITIVE);
-    let mut keys: Vec<(u64, u32)> = mesh
-        .positions
-        .par_iter()
-        .enumerate()
-        .map(|(v, p)| {
-            let q = (*p - low) * scale;
-            (spread(q.x as u64) | spread(q.y as u64) << 1 | spread(q.z as u64) << 2, v as u32)
-        })
-        .collect();
-    keys.par_sort_unstable();
-    keys.into_iter().map(|k| k.1).collect()
-}
-
 /// The values with these numbers. Mostly all are the same, and then nothing is looked up.
 fn gather<T: Copy + PartialEq + Send + Sync>(values: &[T], numbers: &[u32]) -> Vec<T> {
     if is_uniform(values) {
@@ -188,27 +172,10 @@ fn search(triangles: &[[u32; 3]], vertices: usize) -> Vec<u32> {
     order
 }
 
-/// Puts two zeros before each of the lowest 21 bits.
-fn spread(x: u64) -> u64 {
-    let mut x = x & 0x1f_ffff;
-    x = (x | x << 32) & 0x001f_0000_0000_ffff;
-    x = (x | x << 16) & 0x001f_0000_ff00_00ff;
-    x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
-    x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
-    (x | x << 2) & 0x1249_2492_4924_9249
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use topipe_mesh::{Design, FeatureKind, RegionId};
-
-    #[test]
-    fn bits_are_spread_by_three() {
-        for k in 0..21 {
-            assert_eq!(spread(1 << k), 1 << (3 * k));
-        }
-    }
 
     #[test]
     fn a_renumbered_part_is_the_same_part() {

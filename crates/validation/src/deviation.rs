@@ -7,7 +7,7 @@
 
 use crate::DeviationFigures;
 use rayon::prelude::*;
-use topipe_mesh::spatial::{NearestPoint, SurfaceIndex};
+use topipe_mesh::spatial::{NearestPoint, SurfaceIndex, along_curve};
 use topipe_mesh::{DVec3, TriangleMesh};
 
 /// Samples that are measured as one piece of work: fixed, so sums do not depend on the number of threads.
@@ -81,14 +81,17 @@ struct Side {
 }
 
 fn side(from: &Surface<'_>, to: &Surface<'_>) -> Option<Side> {
-    let mut distances: Vec<(f64, f64)> = from
-        .samples
+    // Along a curve through space: what is near the sample before is a better guess then, and in the cache.
+    let order = along_curve(&from.samples.iter().map(|s| s.0).collect::<Vec<_>>());
+    let found: Vec<f64> = order
         .par_chunks(CHUNK)
         .flat_map_iter(|chunk| {
             let mut near = None;
-            chunk.iter().map(move |&(p, weight)| (to.distance(p, &mut near), weight))
+            chunk.iter().map(move |&k| to.distance(from.samples[k as usize].0, &mut near))
         })
         .collect();
+    let mut distances: Vec<(f64, f64)> = from.samples.iter().map(|s| (0.0, s.1)).collect();
+    order.iter().zip(found).for_each(|(&k, d)| distances[k as usize].0 = d);
     let area: f64 = distances.iter().map(|&(_, weight)| weight).sum();
     if !(area > 0.0 && area.is_finite()) {
         return None;

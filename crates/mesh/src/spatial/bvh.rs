@@ -140,19 +140,18 @@ pub struct SurfaceIndex {
 impl SurfaceIndex {
     /// Arranges the faces of `mesh`; positions must be finite. `O(n log n)`.
     pub fn build(mesh: &TriangleMesh) -> Self {
+        let item = |f: FaceId| {
+            let [a, b, c] = mesh.corners(f);
+            Item { low: a.min(b).min(c), high: a.max(b).max(c), face: f }
+        };
+        let items: Vec<Item> = mesh.faces().map(item).collect();
         let mut builder = Builder {
-            boxes: mesh
-                .faces()
-                .map(|f| {
-                    let [a, b, c] = mesh.corners(f);
-                    (a.min(b).min(c), a.max(b).max(c))
-                })
-                .collect(),
-            order: (0..mesh.face_count() as u32).collect(),
-            nodes: Vec::with_capacity(mesh.face_count() + 1),
+            spare: Vec::with_capacity(items.len()),
+            nodes: Vec::with_capacity(items.len() + 1),
+            items,
         };
         builder.build();
-        let faces: Vec<FaceId> = builder.order.into_iter().map(FaceId).collect();
+        let faces: Vec<FaceId> = builder.items.iter().map(|item| item.face).collect();
         let corners = faces.iter().map(|&f| mesh.corners(f)).collect();
         let pairs =
             builder.nodes.get(1..).unwrap_or_default().as_chunks().0.iter().copied().map(Pair::new).collect();
@@ -383,99 +382,155 @@ impl SurfaceIndex {
     }
 }
 
+/// A face while the tree is built.
+#[derive(Debug, Clone, Copy)]
+struct Item {
+    low: DVec3,
+    high: DVec3,
+    face: FaceId,
+}
+
+impl Item {
+    /// Twice the centre of the box, which is as good.
+    #[inline]
+    fn center(&self) -> DVec3 {
+        self.low + self.high
+    }
+}
+
+/// What some items need: a box around them, and one around their centres.
+#[derive(Debug, Clone, Copy)]
+struct Extent {
+    low: DVec3,
+    high: DVec3,
+    centers: [DVec3; 2],
+    count: usize,
+}
+
+impl Extent {
+    const NOTHING: Self = Self {
+        low: DVec3::INFINITY,
+        high: DVec3::NEG_INFINITY,
+        centers: [DVec3::INFINITY, DVec3::NEG_INFINITY],
+        count: 0,
+    };
+
+    #[inline]
+    fn add(&mut self, item: &Item) {
+        let center = item.center();
+        self.low = self.low.min(item.low);
+        self.high = self.high.max(item.high);
+        self.centers = [self.centers[0].min(center), self.centers[1].max(center)];
+        self.count += 1;
+    }
+
+    #[inline]
+    fn and(&self, other: &Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+            centers: [self.centers[0].min(other.centers[0]), self.centers[1].max(other.centers[1])],
+            count: self.count + other.count,
+        }
+    }
+
+    fn of(items: &[Item]) -> Self {
+        let mut extent = Self::NOTHING;
+        items.iter().for_each(|item| extent.add(item));
+        extent
+    }
+}
+
+/// Items are moved, not numbers of them, so that each level of the tree reads memory forwards; boxes of children come from the
+/// bins of their parent. At a million triangles that halves the time.
 struct Builder {
-    boxes: Vec<(DVec3, DVec3)>,
-    order: Vec<u32>,
+    items: Vec<Item>,
+    spare: Vec<Item>,
     nodes: Vec<Node>,
 }
 
 impl Builder {
     fn build(&mut self) {
-        if self.order.is_empty() {
+        if self.items.is_empty() {
             return;
         }
-        self.nodes.push(self.leaf(0, self.order.len()));
-        let mut open = vec![(0usize, 0u32)];
-        while let Some((index, depth)) = open.pop() {
-            let (first, count) = (self.nodes[index].first as usize, self.nodes[index].count as usize);
-            let Some(middle) = self.split(first, count, depth) else { continue };
+        let all = Extent::of(&self.items);
+        self.nodes.push(leaf(0, &all));
+        let mut open = vec![(0usize, 0u32, all)];
+        while let Some((index, depth, extent)) = open.pop() {
+            let first = self.nodes[index].first as usize;
+            let Some([lower, upper]) = self.split(first, &extent, depth) else { continue };
             let child = self.nodes.len();
-            self.nodes.push(self.leaf(first, middle - first));
-            self.nodes.push(self.leaf(middle, first + count - middle));
+            self.nodes.push(leaf(first, &lower));
+            self.nodes.push(leaf(first + lower.count, &upper));
             self.nodes[index].first = child as u32;
             self.nodes[index].count = 0;
-            open.push((child + 1, depth + 1));
-            open.push((child, depth + 1));
+            open.push((child + 1, depth + 1, upper));
+            open.push((child, depth + 1, lower));
         }
     }
 
-    fn leaf(&self, first: usize, count: usize) -> Node {
-        let (low, high) = self.order[first..first + count].iter().fold(
-            (DVec3::INFINITY, DVec3::NEG_INFINITY),
-            |(low, high), &f| {
-                let (l, h) = self.boxes[f as usize];
-                (low.min(l), high.max(h))
-            },
-        );
-        Node { low, high, first: first as u32, count: count as u32 }
-    }
-
-    /// Where to split the faces `first .. first + count`, after reordering them; `None` for a leaf.
-    fn split(&mut self, first: usize, count: usize, depth: u32) -> Option<usize> {
+    /// Splits the items from `first` on, after reordering them; `None` for a leaf.
+    fn split(&mut self, first: usize, extent: &Extent, depth: u32) -> Option<[Extent; 2]> {
+        let count = extent.count;
         if count <= LEAF {
             return None;
         }
-        let halves = Some(first + count / 2);
-        let center = |(low, high): (DVec3, DVec3)| low + high; // twice the centre is as good
-        let (low, high) = self.order[first..first + count].iter().fold(
-            (DVec3::INFINITY, DVec3::NEG_INFINITY),
-            |(low, high), &f| {
-                let c = center(self.boxes[f as usize]);
-                (low.min(c), high.max(c))
-            },
-        );
-        let extent = high - low;
-        let axis = extent.max_position();
-        if depth >= SAH_DEPTH || extent[axis] <= 0.0 {
-            return halves;
+        let items = &mut self.items[first..first + count];
+        let halves = |items: &[Item]| {
+            let (lower, upper) = items.split_at(count / 2);
+            Some([Extent::of(lower), Extent::of(upper)])
+        };
+        let [low, high] = extent.centers;
+        let lengths = high - low;
+        let axis = lengths.max_position();
+        if depth >= SAH_DEPTH || lengths[axis] <= 0.0 {
+            return halves(items);
         }
-        let scale = BINS as f64 / extent[axis];
-        let bin_of = |b: (DVec3, DVec3)| (((center(b)[axis] - low[axis]) * scale) as usize).min(BINS - 1);
-        let mut bins = [(DVec3::INFINITY, DVec3::NEG_INFINITY, 0usize); BINS];
-        for &f in &self.order[first..first + count] {
-            let (l, h) = self.boxes[f as usize];
-            let bin = &mut bins[bin_of((l, h))];
-            *bin = (bin.0.min(l), bin.1.max(h), bin.2 + 1);
+        let scale = BINS as f64 / lengths[axis];
+        let bin_of = |item: &Item| (((item.center()[axis] - low[axis]) * scale) as usize).min(BINS - 1);
+        let mut bins = [Extent::NOTHING; BINS];
+        for item in &*items {
+            bins[bin_of(item)].add(item);
         }
-        let mut right_cost = [0.0; BINS];
-        let mut right = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0usize);
-        for k in (1..BINS).rev() {
-            right = (right.0.min(bins[k].0), right.1.max(bins[k].1), right.2 + bins[k].2);
-            right_cost[k] = half_area(right.0, right.1) * right.2 as f64;
+        let cost = |extent: &Extent| half_area(extent.low, extent.high) * extent.count as f64;
+        let mut right = [Extent::NOTHING; BINS];
+        right[BINS - 1] = bins[BINS - 1];
+        for k in (1..BINS - 1).rev() {
+            right[k] = right[k + 1].and(&bins[k]);
         }
-        let mut left = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0usize);
-        let mut best: Option<(f64, usize)> = None;
+        let mut left = Extent::NOTHING;
+        let mut best: Option<(f64, usize, Extent)> = None;
         for k in 1..BINS {
-            left = (left.0.min(bins[k - 1].0), left.1.max(bins[k - 1].1), left.2 + bins[k - 1].2);
-            if left.2 == 0 || left.2 == count {
+            left = left.and(&bins[k - 1]);
+            if left.count == 0 || left.count == count {
                 continue;
             }
-            let cost = half_area(left.0, left.1) * left.2 as f64 + right_cost[k];
-            if best.is_none_or(|(least, _)| cost < least) {
-                best = Some((cost, k));
+            let cost = cost(&left) + cost(&right[k]);
+            if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
+                best = Some((cost, k, left));
             }
         }
-        let Some((_, cut)) = best else { return halves };
+        let Some((_, cut, lower)) = best else { return halves(items) };
         // Stable partition: the order within each side, and so every answer, depends on the mesh alone.
-        let (mut lower, mut upper) = (Vec::with_capacity(count), Vec::with_capacity(count / 2));
-        for &f in &self.order[first..first + count] {
-            if bin_of(self.boxes[f as usize]) < cut { lower.push(f) } else { upper.push(f) }
+        self.spare.clear();
+        let mut kept = 0;
+        for k in 0..count {
+            let item = items[k];
+            if bin_of(&item) < cut {
+                items[kept] = item;
+                kept += 1;
+            } else {
+                self.spare.push(item);
+            }
         }
-        let middle = first + lower.len();
-        self.order[first..middle].copy_from_slice(&lower);
-        self.order[middle..first + count].copy_from_slice(&upper);
-        Some(middle)
+        items[kept..].copy_from_slice(&self.spare);
+        Some([lower, right[cut]])
     }
+}
+
+fn leaf(first: usize, extent: &Extent) -> Node {
+    Node { low: extent.low, high: extent.high, first: first as u32, count: extent.count as u32 }
 }
 
 fn extent([a, b, c]: [DVec3; 3]) -> (DVec3, DVec3) {
