@@ -34,6 +34,11 @@ impl Stamps {
         Self { stamp: vec![0; vertices], current: 0 }
     }
 
+    /// Makes room for vertices that have come since.
+    pub(crate) fn grow(&mut self, vertices: usize) {
+        self.stamp.resize(vertices, 0);
+    }
+
     fn begin(&mut self) {
         self.current += 1;
     }

@@ -71,7 +71,17 @@ impl Surface {
         }
     }
 
-    fn spread(&self, face: FaceId, heap: &mut BinaryHeap<Candidate>) {
+    /// [`Self::step`], which is asked for at the same edges each time tiles are grown anew.
+    fn known_step(&mut self, h: HalfEdgeId) -> f64 {
+        let known = self.steps[h.index()];
+        if !known.is_nan() {
+            return known;
+        }
+        self.steps[h.index()] = self.step(h);
+        self.steps[h.index()]
+    }
+
+    fn spread(&mut self, face: FaceId, heap: &mut BinaryHeap<Candidate>) {
         let (distance, tile) = (self.distance[face.index()], self.owner[face.index()]);
         for k in 0..3 {
             let h = HalfEdgeId::of(face, k);
@@ -82,7 +92,7 @@ impl Surface {
             if self.fixed[next.index()] {
                 continue;
             }
-            let reach = distance + self.step(h);
+            let reach = distance + self.known_step(h);
             if (reach, tile) < (self.distance[next.index()], self.owner[next.index()]) {
                 heap.push(Candidate { distance: reach, tile, face: next });
             }
@@ -92,9 +102,11 @@ impl Surface {
     /// Grows from the fixed faces of strips.
     fn grow_strips(&mut self) {
         let mut heap = BinaryHeap::new();
-        for f in (0..self.face_count()).filter(|&f| self.fixed[f]) {
-            self.distance[f] = STRIP_START;
-            self.spread(FaceId::new(f), &mut heap);
+        for f in 0..self.face_count() {
+            if self.fixed[f] {
+                self.distance[f] = STRIP_START;
+                self.spread(FaceId::new(f), &mut heap);
+            }
         }
         let seeds: Vec<_> = heap.into_iter().map(|c| (c.tile, c.face, c.distance)).collect();
         self.grow(seeds);

@@ -17,6 +17,7 @@ mod check;
 mod growth;
 mod pieces;
 mod polygons;
+mod recheck;
 mod regions;
 mod repair;
 mod sites;

@@ -7,6 +7,7 @@
 
 use super::check::{Fault, Outline, Stamps, outline};
 use super::growth::Candidate;
+use super::recheck::Recheck;
 use super::surface::NONE;
 use super::{Construction, Seed};
 use crate::TilingError;
@@ -23,13 +24,16 @@ impl Construction<'_> {
     /// because they are held by their own segments.
     pub(crate) fn cut_to_disks(&mut self) -> Result<Vec<u32>, TilingError> {
         let mut held = Vec::new();
+        let mut recheck = Recheck::new(self);
+        let mut stamps = Stamps::new(0);
         for round in 0..MOST_ROUNDS {
             self.progress.check()?;
             held.clear();
             let mut open = Vec::new();
-            let mut by_tile = self.faces_by_tile();
-            let is_corner = self.corner_vertices();
-            let mut stamps = Stamps::new(is_corner.len());
+            recheck.update(self);
+            let mut by_tile = recheck.faces_by_tile(self);
+            stamps.grow(recheck.is_corner.len());
+            let is_corner = &recheck.is_corner;
             let mut busy = vec![false; self.seeds.len()];
             let mut changes = 0;
             for tile in 0..by_tile.len() as u32 {
@@ -39,7 +43,7 @@ impl Construction<'_> {
                 }
                 let surface = &self.surface;
                 // Faces that were split since still belong to it; they are looked at in the next round.
-                let found = outline(surface, &faces, |h| surface.is_border(h), &is_corner, &mut stamps);
+                let found = outline(surface, &faces, |h| surface.is_border(h), is_corner, &mut stamps);
                 if !matches!(&found, Ok(outline) if outline.corners.len() >= 3) {
                     open.push(tile);
                 }
@@ -51,7 +55,7 @@ impl Construction<'_> {
                         };
                         if parted
                             || (round >= JOIN_ROUNDS && self.separate(tile, &faces))
-                            || self.bisect(tile, &faces, &is_corner, &mut stamps)
+                            || self.bisect(tile, &faces, is_corner, &mut stamps)
                         {
                             changes += 1;
                             self.mark_neighbors(&faces, &mut busy);
@@ -68,7 +72,7 @@ impl Construction<'_> {
                             Lens::Later => changes += 1,
                         }
                     }
-                    Ok(_) => {}
+                    Ok(_) => recheck.is_sound[tile as usize] = true,
                 }
             }
             if changes == 0 {

@@ -26,6 +26,8 @@ pub(crate) struct Surface {
     /// Per face: belongs to a strip for good.
     pub(crate) fixed: Vec<bool>,
     pub(crate) centroid: Vec<DVec3>,
+    /// Per half-edge what [`Self::step`] gives, not a number where it was not asked for yet.
+    pub(super) steps: Vec<f64>,
 }
 
 impl Surface {
@@ -35,6 +37,7 @@ impl Surface {
         let centroid = mesh.faces().map(|f| mesh.centroid(f)).collect();
         Self {
             side: vec![NONE; 3 * faces],
+            steps: vec![f64::NAN; 3 * faces],
             on_barrier: vec![false; vertices],
             region,
             size,
@@ -80,6 +83,7 @@ impl Surface {
             debug_assert_eq!(piece.index(), self.owner.len());
             let from = from.index();
             self.side.extend([NONE; 3]);
+            self.steps.extend([f64::NAN; 3]);
             self.region.push(self.region[from]);
             self.size.push(self.size[from]);
             self.owner.push(self.owner[from]);
@@ -91,6 +95,13 @@ impl Surface {
         for &(piece, from) in pieces {
             self.centroid[piece.index()] = mesh.centroid(piece);
             self.centroid[from.index()] = mesh.centroid(from);
+            for h in [piece, from].into_iter().flat_map(|f| (0..3).map(move |k| HalfEdgeId::of(f, k))) {
+                self.steps[h.index()] = f64::NAN;
+                let twin = self.refiner.twin(h);
+                if twin.is_some() {
+                    self.steps[twin.index()] = f64::NAN;
+                }
+            }
         }
     }
 

@@ -169,11 +169,20 @@ fn branches(neighbors: &[Vec<usize>]) -> usize {
 
 /// The largest distance of a point of a border between design and non-design from the mean of that border's points.
 fn largest_interface_radius(part: &Part) -> Option<f64> {
+    let is_non_design = |design: &topipe_mesh::Design| *design == topipe_mesh::Design::NonDesign;
+    // Only edges between vertices that both have at their faces lie on such a border.
+    let mut met = vec![[false; 2]; part.mesh.vertex_count()];
+    for (triangle, design) in part.mesh.triangles.iter().zip(&part.design) {
+        triangle.iter().for_each(|v| met[v.index()][usize::from(is_non_design(design))] = true);
+    }
     let mut sides: BTreeMap<(u32, u32), Vec<bool>> = BTreeMap::new();
     for (triangle, design) in part.mesh.triangles.iter().zip(&part.design) {
         for k in 0..3 {
-            let (a, b) = (triangle[k].0, triangle[(k + 1) % 3].0);
-            sides.entry((a.min(b), a.max(b))).or_default().push(*design == topipe_mesh::Design::NonDesign);
+            let ends = [triangle[k], triangle[(k + 1) % 3]];
+            if ends.iter().all(|v| met[v.index()] == [true; 2]) {
+                let [a, b] = ends.map(|v| v.0);
+                sides.entry((a.min(b), a.max(b))).or_default().push(is_non_design(design));
+            }
         }
     }
     let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
