@@ -43,12 +43,22 @@ impl Net {
     pub(crate) fn folded(&self, corners: &[DVec3; 4], samples: &PatchSamples) -> f64 {
         let (nu, nv) = (2 * self.basis_u.len(), 2 * self.basis_v.len());
         let mut folded = 0;
+        let spans = [self.basis_u.len() / 2 - 1, self.basis_v.len() / 2 - 1];
+        let columns: Vec<_> =
+            (0..=nu).map(|i| hermite::local_pair(spans, [i as f64 / nu as f64, 0.0])).collect();
+        let rows: Vec<_> =
+            (0..=nv).map(|j| hermite::local_pair(spans, [0.0, j as f64 / nv as f64])).collect();
         for j in 0..=nv {
             for i in 0..=nu {
                 let (u, v) = (i as f64 / nu as f64, j as f64 / nv as f64);
+                let ((column, values_u, slopes_u), (row, values_v, slopes_v)) = (&columns[i], &rows[j]);
+                let both = |along: &[DVec2; 4], across: &[DVec2; 4]| {
+                    std::array::from_fn(|k| DVec2::new(along[k].x, across[k].y))
+                };
+                let functions = ([column[0], row[1]], both(values_u, values_v), both(slopes_u, slopes_v));
                 let [a, b, c, d] = *corners;
                 let about = a.lerp(b, u).lerp(d.lerp(c, u), v);
-                let normal = self.evaluate(u, v).normal();
+                let normal = self.combine(functions).normal();
                 let over = normal.dot(about) <= 0.0
                     && !samples.near([u, v], NEAR).any(|sample| normal.dot(sample.normal) > 0.0);
                 folded += usize::from(over);
@@ -69,8 +79,13 @@ impl Net {
 
     pub(crate) fn evaluate(&self, u: f64, v: f64) -> SurfacePoint {
         let width = self.basis_u.len();
-        let spans = [width / 2 - 1, self.basis_v.len() / 2 - 1];
-        let ([i, j], values, slopes) = hermite::local_pair(spans, [u, v]);
+        self.combine(hermite::local_pair([width / 2 - 1, self.basis_v.len() / 2 - 1], [u, v]))
+    }
+
+    /// The point where the functions have the given indices, values and slopes.
+    #[inline]
+    fn combine(&self, ([i, j], values, slopes): ([usize; 2], [DVec2; 4], [DVec2; 4])) -> SurfacePoint {
+        let width = self.basis_u.len();
         // Coordinate by coordinate, what has the factors of the value and of the slope in u side by side.
         let (mut both, mut dv) = ([DVec2::ZERO; 3], [0.0; 3]);
         for l in 0..4 {

@@ -22,6 +22,8 @@ pub(crate) struct Fitted {
     pub(crate) net: Net,
     /// Parameters of the samples' foot points.
     places: Vec<[f64; 2]>,
+    /// The largest distance of a sample, mm.
+    pub(crate) farthest: f64,
 }
 
 /// What all patches are fitted with.
@@ -111,8 +113,8 @@ impl Patches<'_> {
                 if count.is_multiple_of(64) {
                     progress.step(count, layout.quads.len() as u64, "patches");
                 }
-                let places = places(samples);
-                Ok(Fitted { borders: borders.clone(), corners: *corners, net, places })
+                let (places, farthest) = (places(samples), net.farthest(samples));
+                Ok(Fitted { borders: borders.clone(), corners: *corners, net, places, farthest })
             })
             // The first error in the order of the quads, for any number of threads.
             .collect::<Vec<Result<Fitted, SplineFitError>>>()

@@ -87,15 +87,13 @@ impl Refinement {
         setting: &Setting<'_>,
         network: &Network,
         fitted: &[Fitted],
-        samples: &[PatchSamples],
         progress: &Progress,
     ) -> bool {
         // Only easing is left.
         if self.rounds == 0 && !self.eased.is_empty() {
             return false;
         }
-        let residuals: Vec<f64> =
-            samples.par_iter().zip(fitted).map(|(samples, fitted)| fitted.net.farthest(samples)).collect();
+        let residuals: Vec<f64> = fitted.iter().map(|fitted| fitted.farthest).collect();
         progress.remark(&format!(
             "distance at most {:.3e} mm, on {} of {} patches above {:.3e}",
             residuals.iter().fold(0.0f64, |a, &b| a.max(b)),

@@ -34,6 +34,9 @@ impl Patches<'_> {
         let grams = grams(fitted.iter().map(|f| &f.borders));
         fitted.par_iter_mut().zip(samples).try_for_each(|(fitted, samples)| {
             self.progress.check()?;
+            if fitted.farthest <= tolerance {
+                return Ok(());
+            }
             let task = PatchTask::new(&fitted.borders, &fitted.corners, &grams, self.parameters);
             if let Some(nearer) = nearer(&task, &fitted.net, samples, tolerance) {
                 fitted.net = nearer;
@@ -90,9 +93,17 @@ fn nearer(task: &PatchTask<'_>, net: &Net, samples: &mut PatchSamples, tolerance
 fn overshoot(net: &Net, samples: &PatchSamples) -> f64 {
     let (nu, nv) = (net.basis_u.len(), net.basis_v.len());
     let grid = (0..=nv).flat_map(|j| (0..=nu).map(move |i| (i as f64 / nu as f64, j as f64 / nv as f64)));
+    // Coordinate by coordinate, for vector instructions.
+    let [x, y, z] = [0, 1, 2].map(|c| samples.samples.iter().map(|s| s.point[c]).collect::<Vec<f64>>());
     let square = grid.map(|(u, v)| {
         let p = net.evaluate(u, v).position;
-        samples.samples.iter().map(|s| s.point.distance_squared(p)).fold(f64::INFINITY, f64::min)
+        let mut least = f64::INFINITY;
+        for ((x, y), z) in x.iter().zip(&y).zip(&z) {
+            let (x, y, z) = (x - p.x, y - p.y, z - p.z);
+            let square = x * x + y * y + z * z;
+            least = if square < least { square } else { least };
+        }
+        least
     });
     square.fold(0.0, f64::max).sqrt()
 }

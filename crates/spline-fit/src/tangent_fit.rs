@@ -49,7 +49,7 @@ pub(crate) fn fit(
         let network =
             network(&setting, &samples, refinement.spans(), &refinement.reach(&setting), &mut known)?;
         let mut fitted = patches.fit(&mut samples, &network, refinement.spans(), before)?;
-        if !refinement.next(&setting, &network, &fitted, &samples, progress)
+        if !refinement.next(&setting, &network, &fitted, progress)
             && !refinement.ease(&setting, &fitted, &samples, progress)
         {
             patches.draw_nearer(&mut fitted, &mut samples)?;

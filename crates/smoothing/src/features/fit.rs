@@ -162,6 +162,16 @@ impl Cylinder {
         })
     }
 
+    fn bits(&self) -> [u64; 7] {
+        let ([a, b, c], [d, e, f]) = (self.point.to_array(), self.axis.to_array());
+        [a, b, c, d, e, f, self.radius].map(f64::to_bits)
+    }
+
+    fn from_bits(bits: [u64; 7]) -> Self {
+        let [a, b, c, d, e, f, radius] = bits.map(f64::from_bits);
+        Self { point: DVec3::new(a, b, c), axis: DVec3::new(d, e, f), radius }
+    }
+
     /// Least squares of the distances of `points` by at most `rounds` steps of Gauss-Newton, from here.
     pub(super) fn refine(self, points: &[DVec3], rounds: usize) -> Option<Self> {
         self.refine_to(points, rounds, 1e-14)
@@ -171,7 +181,17 @@ impl Cylinder {
     pub(super) fn refine_to(mut self, points: &[DVec3], rounds: usize, precision: f64) -> Option<Self> {
         let n = points.len() as f64;
         let origin = points.iter().sum::<DVec3>() / n;
-        for _ in 0..rounds {
+        // Where noise keeps the steps from getting as short as asked for, they soon come in circles of a few last bits; then
+        // what the last round gives is known.
+        let mut states: Vec<[u64; 7]> = Vec::with_capacity(rounds);
+        let mut round = 0;
+        while round < rounds {
+            if let Some(earlier) = states.iter().position(|state| *state == self.bits()) {
+                let circle = round - earlier;
+                return Some(Self::from_bits(states[earlier + (rounds - round) % circle]));
+            }
+            states.push(self.bits());
+            round += 1;
             // Keep the point of the axis near the data, so that tilt and shift do not trade off.
             self.point += self.axis * self.axis.dot(origin - self.point);
             let (u, v) = self.axis.any_orthonormal_pair();

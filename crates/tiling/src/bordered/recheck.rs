@@ -49,6 +49,7 @@ impl Recheck {
                 }
             }
         }
+        debug_assert_eq!(self.is_corner, construction.corner_vertices());
         self.owner.clone_from(&surface.owner);
     }
 
