@@ -19,6 +19,12 @@ pub(crate) type Refine<'a> = Box<dyn Fn(DVec3, &NearestPoint) -> f64 + Sync + 'a
 /// From a point and a distance that was found for it to the distance from the nearest place of all.
 pub(crate) type Search<'a> = Box<dyn Fn(DVec3, f64) -> f64 + Sync + 'a>;
 
+/// From a sample to the place near it where a distance is largest: that distance, and the place. `None` where a sample is not moved.
+pub(crate) type Climb<'a> = Box<dyn Fn(usize, &dyn Fn(DVec3) -> f64) -> Option<(f64, DVec3)> + Sync + 'a>;
+
+/// Samples with this part of the largest distance of all are moved to where it is largest.
+const HIGH: f64 = 0.3;
+
 /// A surface ready for comparison.
 pub(crate) struct Surface<'a> {
     pub(crate) index: SurfaceIndex,
@@ -26,6 +32,7 @@ pub(crate) struct Surface<'a> {
     samples: Vec<(DVec3, f64)>,
     refine: Option<Refine<'a>>,
     search: Option<Search<'a>>,
+    climb: Option<Climb<'a>>,
 }
 
 impl<'a> Surface<'a> {
@@ -41,7 +48,7 @@ impl<'a> Surface<'a> {
         }
         let used = mesh.positions.iter().copied().zip(weights).filter(|&(_, weight)| weight > 0.0);
         let samples = used.chain(centroids).collect();
-        Self { index: SurfaceIndex::build(mesh), samples, refine: None, search: None }
+        Self { index: SurfaceIndex::build(mesh), samples, refine: None, search: None, climb: None }
     }
 
     pub(crate) fn of_samples(
@@ -49,9 +56,10 @@ impl<'a> Surface<'a> {
         samples: Vec<(DVec3, f64)>,
         refine: Refine<'a>,
         search: Search<'a>,
+        climb: Climb<'a>,
     ) -> Self {
         let index = SurfaceIndex::build(triangulation);
-        Self { index, samples, refine: Some(refine), search: Some(search) }
+        Self { index, samples, refine: Some(refine), search: Some(search), climb: Some(climb) }
     }
 
     /// The distance of `p`, for which `found` was found, from the nearest place of all. At the tip of a spike, which the
@@ -98,7 +106,7 @@ fn side(from: &Surface<'_>, to: &Surface<'_>) -> Option<Side> {
     }
     let mean = distances.iter().map(|&(d, w)| d * w).sum::<f64>() / area;
     let mean_square = distances.iter().map(|&(d, w)| d * d * w).sum::<f64>() / area;
-    let max = largest(&distances, from, to)?;
+    let max = between_samples(&distances, from, to, largest(&distances, from, to)?);
     distances.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let (mut below, mut p95) = (0.0, max.0);
     for (d, weight) in distances {
@@ -125,6 +133,21 @@ fn largest(distances: &[(f64, f64)], from: &Surface<'_>, to: &Surface<'_>) -> Op
         searched[farthest] = true;
         known[farthest] = to.search(p, known[farthest]);
     }
+}
+
+/// The largest distance near any of the samples, at least that which was found at one of them.
+fn between_samples(
+    distances: &[(f64, f64)],
+    from: &Surface<'_>,
+    to: &Surface<'_>,
+    found: (f64, DVec3),
+) -> (f64, DVec3) {
+    let Some(climb) = &from.climb else { return found };
+    let high: Vec<usize> = (0..distances.len()).filter(|&k| distances[k].0 >= HIGH * found.0).collect();
+    let tops: Vec<Option<(f64, DVec3)>> =
+        high.into_par_iter().map(|k| climb(k, &|p| to.distance(p, &mut None))).collect();
+    // The first of equal ones, for any number of threads.
+    tops.into_iter().flatten().fold(found, |best, top| if top.0 > best.0 { top } else { best })
 }
 
 /// The two-sided deviation, `None` where a surface has no area.

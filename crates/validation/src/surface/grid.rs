@@ -1,5 +1,6 @@
 //! Points on a spline surface, a triangulation between them, and the way from the triangulation to the surface.
 
+use super::climb;
 use crate::deviation::Surface;
 use rayon::prelude::*;
 use topipe_mesh::spatial::NearestPoint;
@@ -30,7 +31,10 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
     let grids: Vec<Grid> = surface.patches.par_iter().map(|patch| grid(patch, spacing)).collect();
     let (mut mesh, mut samples) = (TriangleMesh::default(), Vec::new());
     let (mut patch_of_face, mut parameters) = (Vec::new(), Vec::new());
+    // Patch of each sample, and the sizes of its cells.
+    let mut origins: Vec<(usize, [f64; 2])> = Vec::new();
     for (patch, Grid { points, cells }) in grids.into_iter().enumerate() {
+        origins.extend(vec![(patch, cells.map(|n| 1.0 / n as f64)); points.len()]);
         let first = mesh.positions.len();
         for (p, area, uv) in points {
             mesh.positions.push(p);
@@ -60,6 +64,11 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
         }
         samples.push((shape.project(faces.centroid(f)), 0.75 * area));
     }
+    let places = parameters.clone();
+    let climb = move |sample: usize, distance: &dyn Fn(DVec3) -> f64| {
+        let &(patch, cell) = origins.get(sample)?;
+        Some(climb::climb(&surface.patches[patch], places[sample], cell, distance))
+    };
     let triangulation = mesh.clone();
     let boxes: Vec<[DVec3; 2]> = surface.patches.iter().map(bounds).collect();
     let refine = move |p: DVec3, nearest: &NearestPoint| {
@@ -77,7 +86,7 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
         distance(patch, p, start)
     };
     let search = move |p: DVec3, found: f64| nearest_of_all(surface, &boxes, p, found);
-    Surface::of_samples(&mesh, samples, Box::new(refine), Box::new(search))
+    Surface::of_samples(&mesh, samples, Box::new(refine), Box::new(search), Box::new(climb))
 }
 
 /// The distance from `p` to a face of known shape, given the nearest point of its triangulation.

@@ -1,5 +1,6 @@
 //! The spline surface: counts, volume, closeness, smoothness, faces of known shape.
 
+mod climb;
 mod complex;
 mod continuity;
 mod features;

@@ -1,0 +1,72 @@
+//! From a point of a grid on a patch to the place near it that is farthest from another surface.
+//!
+//! Points of a grid miss the crest of a swing between two of them, most of all along sides of patches: the largest distance of
+//! the bracket was 0.18 % of the diagonal at points as far apart as the mesh's vertices and is 0.24 %.
+
+use topipe_mesh::DVec3;
+use topipe_spline_fit::Patch;
+
+/// Steps over the cell of the grid, coarse to fine.
+const STEPS: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
+/// Moves with each step.
+const MOVES: usize = 4;
+
+/// The largest value of `distance` that steps along u and v from a place come to, and the point. Not less than that of the place.
+pub(crate) fn climb(
+    patch: &Patch,
+    place: [f64; 2],
+    cell: [f64; 2],
+    distance: impl Fn(DVec3) -> f64,
+) -> (f64, DVec3) {
+    let at = |[u, v]: [f64; 2]| {
+        let p = patch.evaluate(u, v).position;
+        (distance(p), p)
+    };
+    let (mut place, mut best) = (place, at(place));
+    for step in STEPS {
+        for _ in 0..MOVES {
+            let mut moved = false;
+            for [i, j] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
+                let next =
+                    [place[0] + i * step * cell[0], place[1] + j * step * cell[1]].map(|t| t.clamp(0.0, 1.0));
+                if next != place {
+                    let found = at(next);
+                    if found.0 > best.0 {
+                        (place, best, moved) = (next, found, true);
+                    }
+                }
+            }
+            if !moved {
+                break;
+            }
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use topipe_spline_fit::{Basis, PatchSide};
+
+    #[test]
+    fn the_crest_between_points_of_a_grid_is_found() {
+        let basis = Basis::uniform(3, 1).unwrap();
+        // Highest in the middle: 9/16 of what the four inner control points are.
+        let height = |i: usize, j: usize| if (1..3).contains(&i) && (1..3).contains(&j) { 1.0 } else { 0.0 };
+        let control =
+            (0..16).map(|k| DVec3::new((k % 4) as f64, (k / 4) as f64, height(k % 4, k / 4))).collect();
+        let sides = [PatchSide { edge: 0, reversed: false }; 4];
+        let patch = Patch { sides, basis_u: basis.clone(), basis_v: basis, control };
+        for place in [[0.25, 0.25], [0.75, 0.25], [0.4, 0.9]] {
+            let start = patch.evaluate(place[0], place[1]).position.z;
+            let (found, at) = climb(&patch, place, [0.5, 0.5], |p| p.z);
+            assert!(found > start && (found - 0.5625).abs() < 1e-3, "{found} from {start}");
+            assert!((at.z - found).abs() < 1e-15 && at.distance(DVec3::new(1.5, 1.5, at.z)) < 0.1);
+        }
+        // From the highest place nowhere, and over no side.
+        assert_eq!(climb(&patch, [0.5, 0.5], [0.5, 0.5], |p| p.z).0, 0.5625);
+        let (edge, _) = climb(&patch, [0.9, 0.5], [0.5, 0.5], |p| p.x);
+        assert!((edge - 3.0).abs() < 1e-12);
+    }
+}
