@@ -6,8 +6,8 @@
 //! far side is a border.
 
 use crate::Side;
+use crate::cost::corner;
 use crate::refine::Regions;
-use crate::relax::cost;
 use topipe_mesh::{FaceId, VertexId};
 
 /// Narrowest and widest corner that is left as it is, radians: the gates of 15 and 165 degrees.
@@ -145,7 +145,7 @@ fn edge_cost(regions: &Regions, end: End) -> f64 {
     let corners = regions.edges[end.edge].ends.map(|v| regions.vertices[v as usize]);
     corners
         .into_iter()
-        .flat_map(|v| [end.into, end.out_of].map(|r| cost(regions.tiled.corner_angle(v, r))))
+        .flat_map(|v| [end.into, end.out_of].map(|r| corner(regions.tiled.corner_angle(v, r))))
         .sum()
 }
 

@@ -16,6 +16,7 @@
 //! Not guaranteed: that corners are narrower than 180 degrees; they are penalized in the matching, reported by
 //! validation, and refused above `max_corner_angle` where that is set.
 
+mod cost;
 mod doublets;
 mod dual;
 mod ends;

@@ -8,30 +8,20 @@
 mod marks;
 mod star;
 
+use crate::QuadMatchingError;
+use crate::cost::{corner, taper};
 use crate::refine::Regions;
 use crate::spokes::Cutter;
-use crate::{QuadMatchingError, Side};
 use glam::DVec2;
 use marks::Scratch;
 use rustc_hash::{FxHashMap, FxHashSet};
 use star::Star;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
 use topipe_progress::Progress;
 
 /// Side `k` of a region, and the corner it starts from.
 type Corner = (usize, usize);
-
-/// Corners this far from a right angle, radians, cost nothing.
-const FREE: f64 = 0.52; // 30 degrees
-/// Corners this far from a right angle are next to the gates of 15 and 165 degrees.
-const STEEP: f64 = 1.13; // 65 degrees
-
-/// What an angle at a corner costs.
-pub(crate) fn cost(angle: f64) -> f64 {
-    let off = (angle - FRAC_PI_2).abs();
-    (off - FREE).max(0.0).powi(2) + 100.0 * (off - STEEP).max(0.0).powi(2)
-}
 
 /// Consecutive corners around a vertex, counter-clockwise.
 struct Fan {
@@ -174,34 +164,13 @@ fn path(regions: &Regions, (r, k): Corner) -> Vec<VertexId> {
     path
 }
 
-/// Sides of a quad this many times as long as those opposite to them cost nothing. Crossings of the triangulated bell-crank and
-/// its largest deviation over the diagonal, x 1e-2: 1,476 and 0.25 without this cost, 772 and 0.18 from six times on, 837 and 0.16
-/// from four times on.
-const TAPER: f64 = 4.0;
-
-/// What it costs that sides of a quad are much shorter than those opposite to them: it is a triangle nearly, and its parameter
-/// lines crowd at the short side. Angles do not show it.
-fn taper(regions: &Regions, r: usize) -> f64 {
-    let sides = &regions.sides[r];
-    if sides.len() != 4 {
-        return 0.0;
-    }
-    let mesh = &regions.tiled.refiner.part().mesh;
-    let length = |side: Side| -> f64 {
-        let path = &regions.edges[side.edge as usize].path;
-        path.windows(2).map(|w| mesh.position(w[0]).distance(mesh.position(w[1]))).sum()
-    };
-    let cost = |a: f64, b: f64| ((a.max(b) / a.min(b)).ln() - TAPER.ln()).clamp(0.0, 10.0).powi(2);
-    cost(length(sides[0]), length(sides[2])) + cost(length(sides[1]), length(sides[3]))
-}
-
 /// The cost of the corners that edges from a vertex have to do with: those at the vertex, and at the far ends of the
 /// edges on either hand; and of the quads around it.
 fn star_cost(regions: &Regions, fan: &Fan) -> f64 {
     let at = |(r, k): Corner| {
         let side = regions.sides[r][k];
         let v = regions.vertices[regions.edges[side.edge as usize].ends[side.reversed as usize] as usize];
-        cost(regions.tiled.corner_angle(v, r as u32))
+        corner(regions.tiled.corner_angle(v, r as u32))
     };
     let mut sum = 0.0;
     for (i, &(r, k)) in fan.corners.iter().enumerate() {
