@@ -282,3 +282,63 @@ enum Lens {
     /// A neighbour was changed in this round; look again in the next.
     Later,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Parameters;
+    use crate::bordered::surface::Surface;
+    use topipe_mesh::refine::Refiner;
+    use topipe_mesh::{Part, RegionId, TriangleMesh};
+    use topipe_progress::Progress;
+
+    /// A torus of `columns` columns of eight squares.
+    fn torus(columns: u32) -> Part {
+        let turn = |k: u32, of: u32| f64::from(k) / f64::from(of) * std::f64::consts::TAU;
+        let points = (0..8 * columns)
+            .map(|k| {
+                let ((s, c), (t, d)) = (turn(k / 8, columns).sin_cos(), turn(k % 8, 8).sin_cos());
+                [(3.0 + d) * c, (3.0 + d) * s, t]
+            })
+            .collect();
+        let at = |i: u32, j: u32| (i % columns) * 8 + j % 8;
+        let triangles = (0..columns)
+            .flat_map(|i| (0..8).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]))
+            .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect();
+        Part::new(TriangleMesh::from_arrays(points, triangles))
+    }
+
+    #[test]
+    fn all_parts_of_a_tile_become_tiles_at_once() {
+        let part = torus(12);
+        let faces = part.mesh.face_count();
+        let surface =
+            Surface::new(Refiner::new(&part).unwrap(), vec![RegionId::NONE; faces], vec![1.0; faces]);
+        let (parameters, progress) = (Parameters::default(), Progress::silent());
+        let mut construction = Construction {
+            surface,
+            segments: Vec::new(),
+            is_node: Vec::new(),
+            seeds: vec![Seed::Piece; 2],
+            strip_of_side: Vec::new(),
+            parameters: &parameters,
+            progress: &progress,
+        };
+        // Every other column belongs to tile 0: six rings that touch nowhere.
+        for f in 0..faces {
+            construction.surface.owner[f] = (f / 16 % 2) as u32;
+        }
+        let own = construction.faces_by_tile().swap_remove(0);
+        assert!(construction.separate(0, &own));
+        let by_tile = construction.faces_by_tile();
+        assert_eq!(by_tile.len(), 7);
+        assert_eq!(by_tile[1].len(), faces / 2, "the other tile is as it was");
+        for faces in by_tile.iter().enumerate().filter(|(tile, _)| *tile != 1).map(|(_, faces)| faces) {
+            let column = faces[0].index() / 16;
+            assert!(faces.len() == 16 && faces.iter().all(|f| f.index() / 16 == column));
+        }
+        let own = construction.faces_by_tile().swap_remove(0);
+        assert!(!construction.separate(0, &own), "one part is whole");
+    }
+}
