@@ -363,6 +363,23 @@ mod tests {
         }
     }
 
+    /// A smooth curve would leave the quad a corner of 180 degrees there.
+    #[test]
+    fn a_border_has_a_corner_where_one_quad_lies_in_it() {
+        let (turn, away) = positions()[1];
+        let mut layout = washer(turn, away, true);
+        let kink = |layout: &QuadLayout| {
+            let found = borders(layout).unwrap();
+            let [a, b] = [8, 9].map(|e: usize| found.curves[e].as_ref().unwrap());
+            a.exact(1.0).derivative.angle_between(b.exact(0.0).derivative)
+        };
+        assert!(kink(&layout) < 1e-7);
+        // Only the sides on the border matter: the quad runs along it backwards, through the vertex between edges 8 and 9.
+        let back = |edge: u32| Side { edge, reversed: true };
+        layout.quads.push([back(9), back(8), back(0), back(3)]);
+        assert!(kink(&layout) > 1e-3, "{}", kink(&layout));
+    }
+
     #[test]
     fn no_tooth_is_cut_off_farther_than_the_limit() {
         let (turn, away) = positions()[1];

@@ -29,6 +29,10 @@ const CLOSER: f64 = 0.25;
 /// more time; a second one brings no part nearer.
 const LATE_ROUNDS: u32 = 1;
 const LATE: f64 = 1.5;
+/// Curves of [`MOST_SPANS`] that are then as many tolerances away get twice as many: long ones across folds. Largest deviation of the
+/// bracket over the diagonal, x 1e-2: 0.24 without, 0.20 with it, for 2 % more control points; with twice as many for all that are refined late 0.21
+/// and 8 %.
+const VERY_FAR: f64 = 2.0;
 /// Points of a curve in each of its spans to which the distance of the mesh is measured.
 const POINTS: usize = 8;
 
@@ -120,9 +124,14 @@ impl Refinement {
             .into_par_iter()
             .map(|e| is_far(setting, network, index, limit, e))
             .collect();
+        let very_far = |e: usize| is_far(setting, network, index, VERY_FAR * self.tolerance, e);
+        let finest: Vec<bool> = (0..self.spans.len())
+            .into_par_iter()
+            .map(|e| late && far[e] && self.spans[e] == MOST_SPANS && very_far(e))
+            .collect();
         let mut changed = false;
         for e in 0..self.spans.len() {
-            if (finer[e] || far[e]) && self.spans[e] < MOST_SPANS {
+            if (finer[e] || far[e]) && self.spans[e] < MOST_SPANS || finest[e] {
                 self.spans[e] *= 2;
                 changed = true;
             }

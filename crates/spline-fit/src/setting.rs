@@ -131,3 +131,61 @@ impl<'a> Setting<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::{faces_by_quad, sample};
+    use topipe_mesh::import::{ImportOptions, Source, read_source};
+    use topipe_progress::Progress;
+
+    fn layout(name: &str) -> QuadLayout {
+        let place = format!("{}/../../fixtures/{name}/{name}", env!("CARGO_MANIFEST_DIR"));
+        let silent = Progress::silent();
+        let [bytes, labels] =
+            [".stl", ".labels.csv"].map(|ending| std::fs::read(place.clone() + ending).unwrap());
+        let source = Source { labels: Some(("labels.csv", &labels)), ..Source::new("part.stl", &bytes) };
+        let part = read_source(&source, &ImportOptions::default(), &silent).unwrap();
+        let part = topipe_smoothing::smooth(&part, &Default::default(), &silent).unwrap();
+        let tiling = topipe_tiling::tile(&part, &Default::default(), &silent).unwrap();
+        topipe_quad_matching::match_quads(&tiling, &Default::default(), &silent).unwrap()
+    }
+
+    /// Where two borders fix a tangent plane that is far from the mesh's, an edge between them becomes a crease; afterwards no
+    /// corner of that kind is left, and nothing else has changed.
+    #[test]
+    fn corners_of_borders_become_creases_until_none_is_left() {
+        for name in ["y-form", "bracket"] {
+            let layout = layout(name);
+            let samples: Vec<PatchSamples> = faces_by_quad(&layout)
+                .iter()
+                .enumerate()
+                .map(|(quad, faces)| sample(&layout, quad, faces).unwrap())
+                .collect();
+            let mut setting = Setting::new(&layout).unwrap();
+            let (roles, tangent_to) = (setting.roles.clone(), setting.tangent_to.clone());
+            let found = |setting: &Setting<'_>| {
+                let reach = setting.reach(&vec![4; roles.len()]);
+                let given = setting.given(&samples, &reach);
+                corners(&given, &crease_tangents(&given))
+            };
+            assert_ne!(found(&setting), Corners::default(), "{name}: nothing to do");
+            setting.make_corners(&samples, 4, &Progress::silent());
+            assert_eq!(found(&setting), Corners::default(), "{name}");
+            let on_border = |v: u32| {
+                let ends = layout.edges.iter().zip(&roles).filter(|(edge, _)| edge.ends.contains(&v));
+                ends.into_iter().any(|(_, role)| *role == EdgeRole::Border)
+            };
+            let changed: Vec<usize> = (0..roles.len()).filter(|&e| roles[e] != setting.roles[e]).collect();
+            assert!(!changed.is_empty(), "{name}");
+            for e in changed {
+                assert_eq!((roles[e], setting.roles[e]), (EdgeRole::Smooth, EdgeRole::Crease));
+                assert!(layout.edges[e].ends.iter().any(|&v| on_border(v)), "{name}: edge {e}");
+            }
+            let lost =
+                (0..roles.len()).filter(|&e| tangent_to[e].is_some() && setting.tangent_to[e].is_none());
+            assert!(lost.count() > 0, "{name}");
+            assert!((0..roles.len()).all(|e| setting.tangent_to[e].is_none() || tangent_to[e].is_some()));
+        }
+    }
+}

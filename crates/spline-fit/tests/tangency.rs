@@ -87,3 +87,32 @@ fn patches_on_a_torus_meet_with_a_common_tangent_plane() {
     let tube = |p: topipe_mesh::DVec3| (p.truncate().length() - 3.0).hypot(p.z) - 1.0;
     assert!(off(&surface, tube) < 1e-2);
 }
+
+/// The largest distance of free curves from the mesh, mm.
+fn curves_off(surface: &SplineSurface, mesh: &topipe_mesh::TriangleMesh) -> f64 {
+    let index = topipe_mesh::spatial::SurfaceIndex::build(mesh);
+    let inside = |edge: usize| {
+        surface.patches.iter().flat_map(|p| p.sides).filter(|s| s.edge as usize == edge).count() == 2
+            && surface.edges[edge].feature.is_none()
+    };
+    let curves = (0..surface.edges.len()).filter(|&e| inside(e)).map(|e| &surface.edges[e]);
+    curves
+        .flat_map(|curve| (0..=64).map(|k| curve.position(f64::from(k) / 64.0)))
+        .map(|p| index.nearest(p).unwrap().distance)
+        .fold(0.0, f64::max)
+}
+
+/// Curves that swing out are refined where all samples of the patches beside them are near, too.
+#[test]
+fn curves_come_near_to_the_mesh() {
+    let layout = common::fixture("bracket");
+    let mesh = &layout.part.mesh;
+    let off = |refinements: u32| {
+        let parameters = Parameters { refinements, ..Default::default() };
+        let surface = fit(&layout, &parameters, &Units::none(), &Progress::silent()).unwrap();
+        curves_off(&surface, mesh) / mesh.diagonal()
+    };
+    let (coarse, fine) = (off(0), off(Parameters::default().refinements));
+    assert!(coarse > 2e-3, "{coarse}: nothing to do");
+    assert!(fine < 2e-3, "{fine}");
+}
