@@ -442,7 +442,7 @@ impl Extent {
 }
 
 /// Items are moved, not numbers of them, so that each level of the tree reads memory forwards; boxes of children come from the
-/// bins of their parent. At a million triangles that halves the time.
+/// bins of their parent.
 struct Builder {
     items: Vec<Item>,
     spare: Vec<Item>,
