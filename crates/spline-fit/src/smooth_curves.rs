@@ -44,7 +44,7 @@ impl SmoothCurve {
 }
 
 /// The local fits at the inner breaks of an edge, which are the same for each refinement in which it has the same spans and
-/// their radius is the same. A third of the time of all local fits on the bracket.
+/// their radius is the same.
 #[derive(Debug, Default)]
 pub(crate) struct InnerFits {
     spans: usize,
