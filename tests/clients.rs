@@ -161,12 +161,12 @@ fn report(folder: &Path) -> Value {
     serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
 }
 
-/// The STEP file is one solid, exactly as the report says, and gmsh meshes it at four sizes.
+/// The STEP file is one solid, exactly as the report says, and gmsh meshes its surface and volume at four sizes.
 fn check_solid(python: &Path, folder: &Path, sizes: [f64; 4]) {
     let report = report(folder);
     let sizes = sizes.map(|h| h.to_string()).join(",");
-    let solid =
-        check(python, "check_step.py", &["part.step", "--reference", "smooth.stl", "--gmsh", &sizes], folder);
+    let arguments = ["part.step", "--reference", "smooth.stl", "--gmsh", &sizes, "--volumes"];
+    let solid = check(python, "check_step.py", &arguments, folder);
     println!("{solid:#}");
     assert_eq!(solid["solids"], 1);
     assert_eq!(solid["closed"], true);
@@ -183,7 +183,8 @@ fn check_solid(python: &Path, folder: &Path, sizes: [f64; 4]) {
     let meshes = solid["gmsh"].as_array().unwrap();
     assert_eq!(meshes.len(), 4);
     for mesh in meshes {
-        assert!(mesh.get("error").is_none() && number(mesh, "/triangles") > 0.0, "{mesh}");
+        assert!(mesh.get("error").is_none(), "{mesh}");
+        assert!(number(mesh, "/triangles") > 0.0 && number(mesh, "/tetrahedra") > 0.0, "{mesh}");
     }
 
     // Two implementations that share nothing agree on what the solid is.
