@@ -30,6 +30,7 @@ pub mod control_nets;
 mod corners;
 mod crease_curves;
 mod distances;
+mod easing;
 mod edge_curve;
 mod energy;
 mod error;

@@ -3,9 +3,10 @@
 //! After each fit the distance of the samples from their patches is measured. Edges of patches where it is above its
 //! limit get a finer curve, and the network is computed anew. Where it is the curve itself that is too far from the mesh,
 //! because its local fits reach across a ridge or a notch, or because it swings out between its breaks, it gets a finer
-//! curve too and its local fits reach less far from then on.
+//! curve too and its local fits reach less far from then on, but for what [`crate::easing`] takes back at the end.
 
 use crate::Parameters;
+use crate::easing::Easing;
 use crate::fans::EdgeRole;
 use crate::hermite;
 use crate::network::Network;
@@ -29,9 +30,9 @@ const CLOSER: f64 = 0.25;
 /// more time; a second one brings no part nearer.
 const LATE_ROUNDS: u32 = 1;
 const LATE: f64 = 1.5;
-/// Curves of [`MOST_SPANS`] that are then as many tolerances away get twice as many: long ones across folds. Largest deviation of the
-/// bracket over the diagonal, x 1e-2: 0.24 without, 0.20 with it, for 2 % more control points; with twice as many for all that are refined late 0.21
-/// and 8 %.
+/// Curves of [`MOST_SPANS`] that are then as many tolerances away get twice as many: long ones across folds. Largest deviation
+/// of the bracket over the diagonal, x 1e-2: 0.24 without, 0.20 with it, for 2 % more control points; with twice as many for all
+/// that are refined late 0.21 and 8 %.
 const VERY_FAR: f64 = 2.0;
 /// Points of a curve in each of its spans to which the distance of the mesh is measured.
 const POINTS: usize = 8;
@@ -47,19 +48,7 @@ pub(crate) struct Refinement {
     tolerance: f64,
     /// Of the mesh; built when it is first needed.
     index: Option<SurfaceIndex>,
-    /// Edges beside folded patches whose local fits reach as far as at first again; empty until that is tried.
-    eased: Vec<Eased>,
-    /// Rounds of easing that are left.
-    easing: u32,
-}
-
-/// An edge whose local fits reach as far as at first again.
-struct Eased {
-    edge: usize,
-    /// The factor on their radii that it had.
-    closer: f64,
-    /// How much the patches around its ends were folded then.
-    folded: f64,
+    easing: Easing,
 }
 
 impl Refinement {
@@ -70,8 +59,7 @@ impl Refinement {
             closer: vec![1.0; setting.layout.edges.len()],
             tolerance: parameters.largest_distance(&setting.layout.part.mesh),
             index: None,
-            eased: Vec::new(),
-            easing: 2,
+            easing: Easing::default(),
         }
     }
 
@@ -94,7 +82,7 @@ impl Refinement {
         progress: &Progress,
     ) -> bool {
         // Only easing is left.
-        if self.rounds == 0 && !self.eased.is_empty() {
+        if self.easing.has_begun() {
             return false;
         }
         let residuals: Vec<f64> = fitted.iter().map(|fitted| fitted.farthest).collect();
@@ -143,8 +131,7 @@ impl Refinement {
         changed
     }
 
-    /// After the last refinement: in the first round the local fits along the edges of folded patches reach as far as at
-    /// first again; in the second those are put back that have unfolded nothing. False when nothing changes.
+    /// After the last refinement; see [`Easing::next`].
     pub(crate) fn ease(
         &mut self,
         setting: &Setting<'_>,
@@ -152,85 +139,7 @@ impl Refinement {
         samples: &[PatchSamples],
         progress: &Progress,
     ) -> bool {
-        if self.easing == 0 {
-            return false;
-        }
-        self.easing -= 1;
-        let around = Around::new(setting, |e| self.closer[e] < 1.0 || self.eased.iter().any(|x| x.edge == e));
-        let folded = around.folded(fitted, samples);
-        if self.easing == 0 {
-            let mut restored = 0;
-            for eased in &self.eased {
-                if around.sum(setting, eased.edge, &folded) >= eased.folded {
-                    self.closer[eased.edge] = eased.closer;
-                    restored += 1;
-                }
-            }
-            return restored > 0;
-        }
-        let mut beside = vec![false; self.closer.len()];
-        for (sides, _) in setting.layout.quads.iter().zip(&folded).filter(|(_, share)| **share > 0.0) {
-            sides.iter().for_each(|side| beside[side.edge as usize] = true);
-        }
-        for edge in (0..beside.len()).filter(|&e| beside[e]) {
-            if self.closer[edge] >= 1.0 {
-                continue;
-            }
-            let folded = around.sum(setting, edge, &folded);
-            self.eased.push(Eased { edge, closer: self.closer[edge], folded });
-            self.closer[edge] = 1.0;
-        }
-        progress.remark(&format!(
-            "{} edges beside folded patches follow the mesh less closely",
-            self.eased.len()
-        ));
-        !self.eased.is_empty()
-    }
-}
-
-/// The patches around the ends of some edges.
-struct Around {
-    /// Per vertex, ascending; empty where no such edge ends.
-    quads: Vec<Vec<usize>>,
-    /// Whether a patch is among them.
-    looked_at: Vec<bool>,
-}
-
-impl Around {
-    fn new(setting: &Setting<'_>, edges: impl Fn(usize) -> bool) -> Self {
-        let layout = setting.layout;
-        let mut ends = vec![false; layout.vertices.len()];
-        for (e, edge) in layout.edges.iter().enumerate() {
-            if edges(e) {
-                edge.ends.iter().for_each(|&v| ends[v as usize] = true);
-            }
-        }
-        let mut quads = vec![Vec::new(); layout.vertices.len()];
-        let mut looked_at = vec![false; layout.quads.len()];
-        for quad in 0..layout.quads.len() {
-            for v in layout.corners(quad) {
-                if ends[v as usize] {
-                    quads[v as usize].push(quad);
-                    looked_at[quad] = true;
-                }
-            }
-        }
-        Self { quads, looked_at }
-    }
-
-    /// The share of each patch that is turned over; 0 for those not looked at.
-    fn folded(&self, fitted: &[Fitted], samples: &[PatchSamples]) -> Vec<f64> {
-        let share = |quad: usize| fitted[quad].net.folded(&fitted[quad].corners, &samples[quad]);
-        (0..fitted.len()).into_par_iter().map(|q| if self.looked_at[q] { share(q) } else { 0.0 }).collect()
-    }
-
-    /// How much the patches around the ends of an edge are folded together.
-    fn sum(&self, setting: &Setting<'_>, edge: usize, folded: &[f64]) -> f64 {
-        let mut quads: Vec<usize> =
-            setting.layout.edges[edge].ends.iter().flat_map(|&v| &self.quads[v as usize]).copied().collect();
-        quads.sort_unstable();
-        quads.dedup();
-        quads.into_iter().map(|quad| folded[quad]).sum()
+        self.easing.next(&mut self.closer, setting, fitted, samples, progress)
     }
 }
 

@@ -3,6 +3,7 @@
 use super::climb;
 use crate::deviation::Surface;
 use rayon::prelude::*;
+use std::sync::Arc;
 use topipe_mesh::spatial::NearestPoint;
 use topipe_mesh::{DVec3, RegionShape, TriangleMesh, VertexId};
 use topipe_spline_fit::{Basis, Patch, SplineSurface};
@@ -31,11 +32,11 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
     let grids: Vec<Grid> = surface.patches.par_iter().map(|patch| grid(patch, spacing)).collect();
     let (mut mesh, mut samples) = (TriangleMesh::default(), Vec::new());
     let (mut patch_of_face, mut parameters) = (Vec::new(), Vec::new());
-    // Patch of each sample, and the sizes of its cells.
-    let mut origins: Vec<(usize, [f64; 2])> = Vec::new();
+    // The first sample of each patch, and the sizes of its cells.
+    let mut begins: Vec<(usize, [f64; 2])> = Vec::with_capacity(grids.len());
     for (patch, Grid { points, cells }) in grids.into_iter().enumerate() {
-        origins.extend(vec![(patch, cells.map(|n| 1.0 / n as f64)); points.len()]);
         let first = mesh.positions.len();
+        begins.push((first, cells.map(|n| 1.0 / n as f64)));
         for (p, area, uv) in points {
             mesh.positions.push(p);
             samples.push((p, area));
@@ -64,10 +65,13 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
         }
         samples.push((shape.project(faces.centroid(f)), 0.75 * area));
     }
-    let places = parameters.clone();
+    let parameters: Arc<[[f64; 2]]> = parameters.into();
+    let places = Arc::clone(&parameters);
     let climb = move |sample: usize, distance: &dyn Fn(DVec3) -> f64| {
-        let &(patch, cell) = origins.get(sample)?;
-        Some(climb::climb(&surface.patches[patch], places[sample], cell, distance))
+        // Those of faces come after those of patches.
+        let place = *places.get(sample)?;
+        let patch = begins.partition_point(|&(first, _)| first <= sample) - 1;
+        Some(climb::climb(&surface.patches[patch], place, begins[patch].1, distance))
     };
     let triangulation = mesh.clone();
     let boxes: Vec<[DVec3; 2]> = surface.patches.iter().map(bounds).collect();
