@@ -1,7 +1,7 @@
 //! Numbers on surfaces that are shown as colours: distances and curvature.
 
 use rayon::prelude::*;
-use topipe_mesh::spatial::SurfaceIndex;
+use topipe_mesh::spatial::{SurfaceIndex, Trail};
 use topipe_mesh::{DVec3, TriangleMesh};
 
 /// Points handled together: fixed, so that results do not depend on the number of threads.
@@ -12,14 +12,11 @@ pub(crate) fn distances(points: &[DVec3], surface: &SurfaceIndex) -> Vec<f64> {
     points
         .par_chunks(CHUNK)
         .flat_map_iter(|chunk| {
-            // Points that follow each other are near each other: the search need not go farther than the place before.
-            let mut near: Option<DVec3> = None;
-            chunk.iter().map(move |&p| {
-                let limited = near.and_then(|q| surface.nearest_within(p, p.distance(q) * (1.0 + 1e-9)));
-                let nearest = limited.or_else(|| surface.nearest(p));
-                near = nearest.map(|nearest| nearest.point);
-                nearest.map_or(0.0, |nearest| nearest.distance)
-            })
+            // Points that follow each other are near each other.
+            let mut trail = Trail::default();
+            chunk
+                .iter()
+                .map(move |&p| surface.nearest_along(p, &mut trail).map_or(0.0, |found| found.distance))
         })
         .collect()
 }

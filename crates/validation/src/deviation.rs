@@ -7,7 +7,8 @@
 
 use crate::DeviationFigures;
 use rayon::prelude::*;
-use topipe_mesh::spatial::{NearestPoint, SurfaceIndex, along_curve};
+use std::sync::OnceLock;
+use topipe_mesh::spatial::{NearestPoint, SurfaceIndex, Trail, along_curve};
 use topipe_mesh::{DVec3, TriangleMesh};
 
 /// Samples that are measured as one piece of work: fixed, so sums do not depend on the number of threads.
@@ -19,8 +20,11 @@ pub(crate) type Refine<'a> = Box<dyn Fn(DVec3, &NearestPoint) -> f64 + Sync + 'a
 /// From a point and a distance that was found for it to the distance from the nearest place of all.
 pub(crate) type Search<'a> = Box<dyn Fn(DVec3, f64) -> f64 + Sync + 'a>;
 
+/// The distance of a point, where it is larger than a number.
+pub(crate) type Beyond<'b> = dyn FnMut(DVec3, f64) -> Option<f64> + 'b;
+
 /// From a sample to the place near it where a distance is largest: that distance, and the place. `None` where a sample is not moved.
-pub(crate) type Climb<'a> = Box<dyn Fn(usize, &dyn Fn(DVec3) -> f64) -> Option<(f64, DVec3)> + Sync + 'a>;
+pub(crate) type Climb<'a> = Box<dyn Fn(usize, &mut Beyond<'_>) -> Option<(f64, DVec3)> + Sync + 'a>;
 
 /// Samples with this part of the largest distance of all are moved to where it is largest.
 const HIGH: f64 = 0.3;
@@ -30,6 +34,8 @@ pub(crate) struct Surface<'a> {
     pub(crate) index: SurfaceIndex,
     /// Points and the area each stands for.
     samples: Vec<(DVec3, f64)>,
+    /// The samples along a curve through space, once that is asked for.
+    order: OnceLock<Vec<u32>>,
     refine: Option<Refine<'a>>,
     search: Option<Search<'a>>,
     climb: Option<Climb<'a>>,
@@ -48,7 +54,14 @@ impl<'a> Surface<'a> {
         }
         let used = mesh.positions.iter().copied().zip(weights).filter(|&(_, weight)| weight > 0.0);
         let samples = used.chain(centroids).collect();
-        Self { index: SurfaceIndex::build(mesh), samples, refine: None, search: None, climb: None }
+        Self {
+            index: SurfaceIndex::build(mesh),
+            samples,
+            order: OnceLock::new(),
+            refine: None,
+            search: None,
+            climb: None,
+        }
     }
 
     pub(crate) fn of_samples(
@@ -59,7 +72,8 @@ impl<'a> Surface<'a> {
         climb: Climb<'a>,
     ) -> Self {
         let index = SurfaceIndex::build(triangulation);
-        Self { index, samples, refine: Some(refine), search: Some(search), climb: Some(climb) }
+        let order = OnceLock::new();
+        Self { index, samples, order, refine: Some(refine), search: Some(search), climb: Some(climb) }
     }
 
     /// The distance of `p`, for which `found` was found, from the nearest place of all. At the tip of a spike, which the
@@ -68,15 +82,23 @@ impl<'a> Surface<'a> {
         self.search.as_ref().map_or(found, |search| search(p, found))
     }
 
-    /// The distance of `p`. `near` is a point of the triangulation, best that of the sample before: the search need
-    /// not look farther than it. It is left at the nearest point found. Halves the time on the bell crank;
-    /// the result is the same up to rounding.
-    pub(crate) fn distance(&self, p: DVec3, near: &mut Option<DVec3>) -> f64 {
-        // A little more than the distance, so that rounding does not exclude the point itself.
-        let limited = near.and_then(|q| self.index.nearest_within(p, p.distance(q) * (1.0 + 1e-9)));
-        let Some(nearest) = limited.or_else(|| self.index.nearest(p)) else { return f64::INFINITY };
-        *near = Some(nearest.point);
+    /// The distance of `p`, one of many points that follow each other.
+    pub(crate) fn distance(&self, p: DVec3, trail: &mut Trail) -> f64 {
+        let Some(nearest) = self.index.nearest_along(p, trail) else { return f64::INFINITY };
         self.refine.as_ref().map_or(nearest.distance, |refine| refine(p, &nearest))
+    }
+
+    /// The distance of `p` where it is larger than `limit`, which takes less time to deny than to find out.
+    fn beyond(&self, p: DVec3, limit: f64, trail: &mut Trail) -> Option<f64> {
+        if self.refine.is_some() || self.index.is_empty() || !p.is_finite() {
+            return Some(self.distance(p, trail)).filter(|d| *d > limit);
+        }
+        self.index.nearest_beyond(p, limit, trail).map(|found| found.distance)
+    }
+
+    /// The samples so that neighbours follow each other, and are in the cache.
+    fn order(&self) -> &[u32] {
+        self.order.get_or_init(|| along_curve(&self.samples.iter().map(|s| s.0).collect::<Vec<_>>()))
     }
 }
 
@@ -89,13 +111,20 @@ struct Side {
 }
 
 fn side(from: &Surface<'_>, to: &Surface<'_>) -> Option<Side> {
-    // Along a curve through space: what is near the sample before is a better guess then, and in the cache.
-    let order = along_curve(&from.samples.iter().map(|s| s.0).collect::<Vec<_>>());
+    let order = from.order();
     let found: Vec<f64> = order
         .par_chunks(CHUNK)
         .flat_map_iter(|chunk| {
-            let mut near = None;
-            chunk.iter().map(move |&k| to.distance(from.samples[k as usize].0, &mut near))
+            let mut trail = Trail::default();
+            let mut before = (DVec3::NAN, 0.0);
+            chunk.iter().map(move |&k| {
+                let p = from.samples[k as usize].0;
+                // Triangles sample their common corners each for itself: more than half of all samples.
+                if p != before.0 {
+                    before = (p, to.distance(p, &mut trail));
+                }
+                before.1
+            })
         })
         .collect();
     let mut distances: Vec<(f64, f64)> = from.samples.iter().map(|s| (0.0, s.1)).collect();
@@ -144,8 +173,10 @@ fn between_samples(
 ) -> (f64, DVec3) {
     let Some(climb) = &from.climb else { return found };
     let high: Vec<usize> = (0..distances.len()).filter(|&k| distances[k].0 >= HIGH * found.0).collect();
-    let tops: Vec<Option<(f64, DVec3)>> =
-        high.into_par_iter().map(|k| climb(k, &|p| to.distance(p, &mut None))).collect();
+    let tops: Vec<Option<(f64, DVec3)>> = high
+        .into_par_iter()
+        .map_init(Trail::default, |trail, k| climb(k, &mut |p, limit| to.beyond(p, limit, trail)))
+        .collect();
     // The first of equal ones, for any number of threads.
     tops.into_iter().flatten().fold(found, |best, top| if top.0 > best.0 { top } else { best })
 }
@@ -215,13 +246,15 @@ mod tests {
     #[test]
     fn the_sample_before_only_saves_time() {
         let surface = Surface::of_mesh(&plate(0.0, 2.0));
-        let mut near = None;
+        let mut trail = Trail::default();
         for k in 0..500 {
             // A path that jumps to and fro, over the plate and beyond its sides.
             let t = f64::from(k);
             let p = DVec3::new(3.0 * (0.7 * t).sin(), 3.0 * (1.9 * t).cos(), (0.3 * t).sin());
-            let (limited, free) = (surface.distance(p, &mut near), surface.distance(p, &mut None));
-            assert!((limited - free).abs() <= 1e-14, "{limited} {free}");
+            let free = surface.distance(p, &mut Trail::default());
+            assert_eq!(surface.distance(p, &mut trail), free);
+            assert_eq!(surface.beyond(p, 0.9 * free, &mut trail), Some(free));
+            assert_eq!(surface.beyond(p, free, &mut trail), None);
         }
     }
 }

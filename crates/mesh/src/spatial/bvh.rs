@@ -8,7 +8,7 @@
 //! built in 0.4 to 0.8 of its time, nearest points near the surface in 0.7 to 0.9, far from it in 0.8 to 1.0, rays in
 //! 0.6 to 0.9. Of 20,000 rays aimed at vertices parry lost 72, this index none.
 
-use super::triangle::{Crossing, closest_point_on_triangle, cross};
+use super::triangle::{Crossing, cross};
 use crate::{FaceId, TriangleMesh};
 use glam::DVec3;
 
@@ -19,7 +19,7 @@ const BINS: usize = 16;
 /// Below this depth nodes are split in the middle of the list, so that the depth stays bounded by this plus 32.
 const SAH_DEPTH: u32 = 60;
 /// Room for one sibling per level.
-const STACK: usize = SAH_DEPTH as usize + 36;
+pub(super) const STACK: usize = SAH_DEPTH as usize + 36;
 
 /// Directions (not of unit length) to ask for inside and outside in: far from the axes and diagonals that meshes are aligned with.
 pub(crate) const DIRECTIONS: [DVec3; 6] = [
@@ -32,18 +32,18 @@ pub(crate) const DIRECTIONS: [DVec3; 6] = [
 ];
 
 #[derive(Debug, Clone, Copy)]
-struct Node {
+pub(super) struct Node {
     low: DVec3,
     high: DVec3,
     /// Leaf: the first triangle. Inner node: the first of its two children.
-    first: u32,
+    pub(super) first: u32,
     /// Triangles of a leaf; 0 for an inner node.
-    count: u32,
+    pub(super) count: u32,
 }
 
 impl Node {
     #[inline]
-    fn distance_squared(&self, p: DVec3) -> f64 {
+    pub(super) fn distance_squared(&self, p: DVec3) -> f64 {
         (self.low - p).max(p - self.high).max(DVec3::ZERO).length_squared()
     }
 
@@ -64,11 +64,11 @@ impl Node {
 
 /// Two siblings, coordinate beside coordinate: the distances of both boxes are one run of vector instructions.
 #[derive(Debug, Clone, Copy)]
-struct Pair {
+pub(super) struct Pair {
     low: [[f64; 2]; 3],
     high: [[f64; 2]; 3],
-    first: [u32; 2],
-    count: [u32; 2],
+    pub(super) first: [u32; 2],
+    pub(super) count: [u32; 2],
 }
 
 impl Pair {
@@ -90,7 +90,7 @@ impl Pair {
 
     /// [`Node::distance_squared`] of both, by the same operations.
     #[inline]
-    fn distances_squared(&self, p: DVec3) -> [f64; 2] {
+    pub(super) fn distances_squared(&self, p: DVec3) -> [f64; 2] {
         let p = p.to_array();
         let larger = |a: f64, b: f64| if a > b { a } else { b };
         let mut sum = [0.0; 2];
@@ -102,17 +102,6 @@ impl Pair {
         }
         sum
     }
-}
-
-/// The answer of [`SurfaceIndex::nearest`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NearestPoint {
-    /// Distance from the query to `point`.
-    pub distance: f64,
-    /// The nearest point of the surface.
-    pub point: DVec3,
-    /// The face it lies on; of several at the same distance the one with the lowest id.
-    pub face: FaceId,
 }
 
 /// The answer of [`SurfaceIndex::ray`].
@@ -130,11 +119,11 @@ pub struct RayHit {
 #[derive(Debug, Clone)]
 pub struct SurfaceIndex {
     /// None without faces.
-    root: Option<Node>,
+    pub(super) root: Option<Node>,
     /// All other nodes, numbered from 1 on, siblings together.
-    pairs: Vec<Pair>,
-    faces: Vec<FaceId>,
-    corners: Vec<[DVec3; 3]>,
+    pub(super) pairs: Vec<Pair>,
+    pub(super) faces: Vec<FaceId>,
+    pub(super) corners: Vec<[DVec3; 3]>,
 }
 
 impl SurfaceIndex {
@@ -174,67 +163,6 @@ impl SurfaceIndex {
     /// The corners of the bounding box of all faces; zeros without faces.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         self.root.map_or((DVec3::ZERO, DVec3::ZERO), |n| (n.low, n.high))
-    }
-
-    /// The point of the surface nearest to `point`. `None` without faces or for a point that is not finite.
-    pub fn nearest(&self, point: DVec3) -> Option<NearestPoint> {
-        self.nearest_within(point, f64::INFINITY)
-    }
-
-    /// Whether the surface is no farther from `point` than `limit`: what [`Self::nearest_within`] finds, but any such place ends
-    /// the search.
-    pub fn is_within(&self, point: DVec3, limit: f64) -> bool {
-        self.descend(point, limit, true).is_some()
-    }
-
-    /// As [`Self::nearest`], but `None` where the surface is farther away than `limit`.
-    pub fn nearest_within(&self, point: DVec3, limit: f64) -> Option<NearestPoint> {
-        self.descend(point, limit, false)
-    }
-
-    /// The nearest point within `limit`, or `any`.
-    #[inline]
-    fn descend(&self, point: DVec3, limit: f64, any: bool) -> Option<NearestPoint> {
-        let root = self.root?;
-        if !point.is_finite() {
-            return None;
-        }
-        let mut best = limit * limit;
-        let mut found: Option<(DVec3, FaceId)> = None;
-        // Of each node what it holds, and how far it is.
-        let mut stack = [(0u32, 0u32, 0.0f64); STACK];
-        stack[0] = (root.first, root.count, root.distance_squared(point));
-        let mut depth = 1;
-        while depth > 0 {
-            depth -= 1;
-            let (first, count, distance) = stack[depth];
-            if distance > best {
-                continue;
-            }
-            if count > 0 {
-                for slot in first as usize..(first + count) as usize {
-                    let q = closest_point_on_triangle(point, self.corners[slot]);
-                    let d = point.distance_squared(q);
-                    let face = self.faces[slot];
-                    if d < best || (d == best && found.is_none_or(|(_, f)| face < f)) {
-                        best = d;
-                        found = Some((q, face));
-                        if any {
-                            return Some(NearestPoint { distance: d.sqrt(), point: q, face });
-                        }
-                    }
-                }
-                continue;
-            }
-            let pair = &self.pairs[(first as usize - 1) / 2];
-            let distances = pair.distances_squared(point);
-            let near = usize::from(distances[0] > distances[1]);
-            for (place, side) in [(depth, 1 - near), (depth + 1, near)] {
-                stack[place] = (pair.first[side], pair.count[side], distances[side]);
-            }
-            depth += 2;
-        }
-        found.map(|(q, face)| NearestPoint { distance: best.sqrt(), point: q, face })
     }
 
     /// The first place where the ray meets the surface, from either side, within `limit` (a length; may be infinite).

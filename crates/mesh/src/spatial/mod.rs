@@ -9,11 +9,13 @@ mod bvh;
 mod crossing;
 mod curve;
 mod deviation;
+mod nearest;
 mod triangle;
 
 pub(crate) use bvh::DIRECTIONS;
-pub use bvh::{NearestPoint, RayHit, SurfaceIndex};
+pub use bvh::{RayHit, SurfaceIndex};
 pub use crossing::{Crossing, crossings};
 pub use curve::along_curve;
 pub use deviation::{Deviation, deviation};
+pub use nearest::{NearestPoint, Trail};
 pub use triangle::closest_point_on_triangle;

@@ -3,7 +3,14 @@
 use glam::DVec3;
 
 /// The point of the triangle nearest to `p`. Triangles without area are treated as the segments they are.
-pub fn closest_point_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
+pub fn closest_point_on_triangle(p: DVec3, corners: [DVec3; 3]) -> DVec3 {
+    // Within infinity there always is one.
+    closest_point_within(p, corners, f64::INFINITY).unwrap_or(corners[0])
+}
+
+/// The same, but none where it is certain without a look at the edges that the square of its distance is above `limit`.
+#[inline]
+pub(super) fn closest_point_within(p: DVec3, [a, b, c]: [DVec3; 3], limit: f64) -> Option<DVec3> {
     let (ab, ac) = (b - a, c - a);
     let normal = ab.cross(ac);
     let area2 = normal.length_squared();
@@ -13,7 +20,20 @@ pub fn closest_point_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
         let v = ap.cross(ac).dot(normal);
         let w = ab.cross(ap).dot(normal);
         if v >= 0.0 && w >= 0.0 && v + w <= area2 {
-            return a + ab * (v / area2) + ac * (w / area2);
+            return Some(a + ab * (v / area2) + ac * (w / area2));
+        }
+        // The distance from the plane, and in it that from the line of an edge that `p` lies beyond, times the length of the normal
+        // and of the edge.
+        let (h, u) = (ap.dot(normal), area2 - v - w);
+        let (ab2, ac2, bc2) = (ab.length_squared(), ac.length_squared(), (c - b).length_squared());
+        let far = limit * area2 * (1.0 + SLACK);
+        let beyond = |side: f64, edge2: f64| side < 0.0 && side * side + h * h * edge2 > far * edge2;
+        if beyond(v, ac2) || beyond(w, ab2) || beyond(u, bc2) {
+            // Rounding of the products, in slivers that of the normal, must be far below the limit.
+            let (short, long) = (ab2.min(ac2).min(bc2), ab2.max(ac2).max(bc2));
+            if limit * area2 * short > NOISE * ap.length_squared() * long * long * long {
+                return None;
+            }
         }
     }
     let on_edges = [closest_on_segment(p, a, b), closest_on_segment(p, b, c), closest_on_segment(p, c, a)];
@@ -23,8 +43,13 @@ pub fn closest_point_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
             best = *q;
         }
     }
-    best
+    Some(best)
 }
+
+/// What is farther by this part, squared, is farther in spite of rounding.
+const SLACK: f64 = 1e-2;
+/// The square of the relative rounding of a triple product is some 1e-29; with this it stays below 1e-6 of the limit.
+const NOISE: f64 = 1e-22;
 
 fn closest_on_segment(p: DVec3, a: DVec3, b: DVec3) -> DVec3 {
     let ab = b - a;

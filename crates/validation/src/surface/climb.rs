@@ -11,29 +11,30 @@ const STEPS: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
 /// Moves with each step.
 const MOVES: usize = 4;
 
-/// The largest value of `distance` that steps along u and v from a place come to, and the point. Not less than that of the place.
+/// The largest distance that steps along u and v from a place come to, and the point. Not less than that of the place.
+/// `beyond` gives the distance of a point where it is larger than a number.
 pub(crate) fn climb(
     patch: &Patch,
     place: [f64; 2],
     cell: [f64; 2],
-    distance: impl Fn(DVec3) -> f64,
+    mut beyond: impl FnMut(DVec3, f64) -> Option<f64>,
 ) -> (f64, DVec3) {
-    let at = |[u, v]: [f64; 2]| {
+    let mut at = |[u, v]: [f64; 2], limit: f64| {
         let p = patch.evaluate(u, v).position;
-        (distance(p), p)
+        (beyond(p, limit), p)
     };
-    let (mut place, mut best) = (place, at(place));
+    let (start, p) = at(place, f64::NEG_INFINITY);
+    let (mut place, mut best) = (place, (start.unwrap_or(f64::NEG_INFINITY), p));
     for step in STEPS {
         for _ in 0..MOVES {
             let mut moved = false;
             for [i, j] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
                 let next =
                     [place[0] + i * step * cell[0], place[1] + j * step * cell[1]].map(|t| t.clamp(0.0, 1.0));
-                if next != place {
-                    let found = at(next);
-                    if found.0 > best.0 {
-                        (place, best, moved) = (next, found, true);
-                    }
+                if next != place
+                    && let (Some(found), p) = at(next, best.0)
+                {
+                    (place, best, moved) = (next, (found, p), true);
                 }
             }
             if !moved {
@@ -49,6 +50,10 @@ mod tests {
     use super::*;
     use topipe_spline_fit::{Basis, PatchSide};
 
+    fn beyond(distance: impl Fn(DVec3) -> f64) -> impl FnMut(DVec3, f64) -> Option<f64> {
+        move |p, limit| Some(distance(p)).filter(|d| *d > limit)
+    }
+
     #[test]
     fn the_crest_between_points_of_a_grid_is_found() {
         let basis = Basis::uniform(3, 1).unwrap();
@@ -60,13 +65,13 @@ mod tests {
         let patch = Patch { sides, basis_u: basis.clone(), basis_v: basis, control };
         for place in [[0.25, 0.25], [0.75, 0.25], [0.4, 0.9]] {
             let start = patch.evaluate(place[0], place[1]).position.z;
-            let (found, at) = climb(&patch, place, [0.5, 0.5], |p| p.z);
+            let (found, at) = climb(&patch, place, [0.5, 0.5], beyond(|p| p.z));
             assert!(found > start && (found - 0.5625).abs() < 1e-3, "{found} from {start}");
             assert!((at.z - found).abs() < 1e-15 && at.distance(DVec3::new(1.5, 1.5, at.z)) < 0.1);
         }
         // From the highest place nowhere, and over no side.
-        assert_eq!(climb(&patch, [0.5, 0.5], [0.5, 0.5], |p| p.z).0, 0.5625);
-        let (edge, _) = climb(&patch, [0.9, 0.5], [0.5, 0.5], |p| p.x);
+        assert_eq!(climb(&patch, [0.5, 0.5], [0.5, 0.5], beyond(|p| p.z)).0, 0.5625);
+        let (edge, _) = climb(&patch, [0.9, 0.5], [0.5, 0.5], beyond(|p| p.x));
         assert!((edge - 3.0).abs() < 1e-12);
     }
 }

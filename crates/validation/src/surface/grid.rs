@@ -1,7 +1,7 @@
 //! Points on a spline surface, a triangulation between them, and the way from the triangulation to the surface.
 
 use super::climb;
-use crate::deviation::Surface;
+use crate::deviation::{Beyond, Surface};
 use rayon::prelude::*;
 use std::sync::Arc;
 use topipe_mesh::spatial::NearestPoint;
@@ -67,11 +67,11 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
     }
     let parameters: Arc<[[f64; 2]]> = parameters.into();
     let places = Arc::clone(&parameters);
-    let climb = move |sample: usize, distance: &dyn Fn(DVec3) -> f64| {
+    let climb = move |sample: usize, beyond: &mut Beyond<'_>| {
         // Those of faces come after those of patches.
         let place = *places.get(sample)?;
         let patch = begins.partition_point(|&(first, _)| first <= sample) - 1;
-        Some(climb::climb(&surface.patches[patch], place, begins[patch].1, distance))
+        Some(climb::climb(&surface.patches[patch], place, begins[patch].1, beyond))
     };
     let triangulation = mesh.clone();
     let boxes: Vec<[DVec3; 2]> = surface.patches.iter().map(bounds).collect();
@@ -214,6 +214,7 @@ fn nearest_of_all(surface: &SplineSurface, boxes: &[[DVec3; 2]], p: DVec3, found
 #[cfg(test)]
 mod tests {
     use super::*;
+    use topipe_mesh::spatial::Trail;
     use topipe_spline_fit::PatchSide;
 
     #[test]
@@ -242,7 +243,7 @@ mod tests {
             for offset in [0.0, 0.05, -0.05] {
                 let p = s.position + s.normal() * offset;
                 let nearest = sampled.index.nearest(p).unwrap();
-                let found = sampled.distance(p, &mut None);
+                let found = sampled.distance(p, &mut Trail::default());
                 assert!((found - offset.abs()).abs() < 1e-8, "{found} for {offset} at ({u}, {v})");
                 chords = chords.max((nearest.distance - offset.abs()).abs());
             }
@@ -277,7 +278,7 @@ mod tests {
         let tip = surface.patches[0].evaluate(u, v).position;
         assert!(tip.z > 0.3, "{tip}");
         assert!(sampled.index.nearest(tip).unwrap().distance > 0.3, "the triangulation cuts it off");
-        let found = sampled.distance(tip, &mut None);
+        let found = sampled.distance(tip, &mut Trail::default());
         assert!(found > 0.1 && sampled.search(tip, found) < 1e-9, "{found}");
     }
 }

@@ -1,0 +1,169 @@
+//! The point of a surface nearest to another.
+
+use super::bvh::{STACK, SurfaceIndex};
+use super::triangle::closest_point_within;
+use crate::FaceId;
+use glam::DVec3;
+
+/// The answer of [`SurfaceIndex::nearest`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestPoint {
+    /// Distance from the query to `point`.
+    pub distance: f64,
+    /// The nearest point of the surface.
+    pub point: DVec3,
+    /// The face it lies on; of several at the same distance the one with the lowest id.
+    pub face: FaceId,
+}
+
+/// What one search leaves to the next one for a point near by, on the same index: the triangle that was found, so that nothing
+/// farther is looked at, and memory. It changes no answer.
+#[derive(Debug, Clone)]
+pub struct Trail {
+    /// The place of the triangle in the index, if there is one.
+    last: Option<u32>,
+    /// Of each node that is still to be looked at what it holds, and how far it is.
+    stack: [(u32, u32, f64); STACK],
+}
+
+impl Default for Trail {
+    fn default() -> Self {
+        Self { last: None, stack: [(0, 0, 0.0); STACK] }
+    }
+}
+
+impl SurfaceIndex {
+    /// The point of the surface nearest to `point`. `None` without faces or for a point that is not finite.
+    pub fn nearest(&self, point: DVec3) -> Option<NearestPoint> {
+        self.nearest_along(point, &mut Trail::default())
+    }
+
+    /// As [`Self::nearest`], for one of many points that follow each other: sooner done, the nearer `point` is to that of the
+    /// search before.
+    pub fn nearest_along(&self, point: DVec3, trail: &mut Trail) -> Option<NearestPoint> {
+        self.descend(point, f64::INFINITY, trail, |_| false)
+    }
+
+    /// As [`Self::nearest_along`], but `None` where the surface is no farther from `point` than `limit`; any such place ends
+    /// the search.
+    pub fn nearest_beyond(&self, point: DVec3, limit: f64, trail: &mut Trail) -> Option<NearestPoint> {
+        let near = |square: f64| square.sqrt() <= limit;
+        self.descend(point, f64::INFINITY, trail, near).filter(|found| found.distance > limit)
+    }
+
+    /// Whether the surface is no farther from `point` than `limit`: what [`Self::nearest_within`] finds, but any such place ends
+    /// the search.
+    pub fn is_within(&self, point: DVec3, limit: f64) -> bool {
+        self.descend(point, limit, &mut Trail::default(), |_| true).is_some()
+    }
+
+    /// As [`Self::nearest`], but `None` where the surface is farther away than `limit`.
+    pub fn nearest_within(&self, point: DVec3, limit: f64) -> Option<NearestPoint> {
+        self.descend(point, limit, &mut Trail::default(), |_| false)
+    }
+
+    /// The nearest point within `limit`, or any that is near `enough`, by the square of its distance.
+    #[inline]
+    fn descend(
+        &self,
+        point: DVec3,
+        limit: f64,
+        trail: &mut Trail,
+        enough: impl Fn(f64) -> bool,
+    ) -> Option<NearestPoint> {
+        let root = self.root?;
+        if !point.is_finite() {
+            return None;
+        }
+        let mut best = limit * limit;
+        // The nearest point, its face, and the place of that in the index.
+        let mut found: Option<(DVec3, FaceId, u32)> = None;
+        let answer = |(point, face, _), best: f64| NearestPoint { distance: best.sqrt(), point, face };
+        let last = trail.last.filter(|&slot| (slot as usize) < self.corners.len());
+        let stack = &mut trail.stack;
+        stack[0] = (root.first, root.count, root.distance_squared(point));
+        // The triangle that was found last comes first.
+        let mut depth = 1;
+        if let Some(slot) = last {
+            stack[1] = (slot, 1, 0.0);
+            depth = 2;
+        }
+        while depth > 0 {
+            depth -= 1;
+            let (first, count, distance) = stack[depth];
+            if distance > best {
+                continue;
+            }
+            if count > 0 {
+                for slot in first..first + count {
+                    let corners = self.corners[slot as usize];
+                    let Some(q) = closest_point_within(point, corners, best) else { continue };
+                    let d = point.distance_squared(q);
+                    let face = self.faces[slot as usize];
+                    if d < best || (d == best && found.is_none_or(|(_, f, _)| face < f)) {
+                        best = d;
+                        let now = (q, face, slot);
+                        found = Some(now);
+                        if enough(d) {
+                            trail.last = Some(slot);
+                            return Some(answer(now, best));
+                        }
+                    }
+                }
+                continue;
+            }
+            let pair = &self.pairs[(first as usize - 1) / 2];
+            let distances = pair.distances_squared(point);
+            let near = usize::from(distances[0] > distances[1]);
+            for (place, side) in [(depth, 1 - near), (depth + 1, near)] {
+                stack[place] = (pair.first[side], pair.count[side], distances[side]);
+            }
+            depth += 2;
+        }
+        let found = found?;
+        trail.last = Some(found.2);
+        Some(answer(found, best))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::TriangleMesh;
+
+    /// A wavy plate of `n` x `n` squares.
+    fn plate(n: u32) -> TriangleMesh {
+        let at = |i: u32, k: u32| i * (n + 1) + k;
+        let places = (0..=n).flat_map(|i| (0..=n).map(move |k| (f64::from(i), f64::from(k))));
+        let points = places.map(|(x, y)| [x, y, (0.7 * x).sin() + (0.4 * y).cos()]).collect();
+        let squares = (0..n).flat_map(|i| (0..n).map(move |k| (i, k)));
+        let halves = squares.flat_map(|(i, k)| {
+            [[at(i, k), at(i + 1, k), at(i + 1, k + 1)], [at(i, k), at(i + 1, k + 1), at(i, k + 1)]]
+        });
+        TriangleMesh::from_arrays(points, halves.collect())
+    }
+
+    #[test]
+    fn the_search_before_changes_no_answer() {
+        let index = SurfaceIndex::build(&plate(12));
+        let mut trail = Trail::default();
+        for k in 0..2000 {
+            // Steps along the plate and jumps over it, above vertices and edges too.
+            let t = f64::from(k);
+            let p =
+                DVec3::new(6.0 + 8.0 * (0.01 * t).sin(), (3.7 * (t / 16.0).floor()) % 12.0, (0.3 * t).sin());
+            let p = if k % 3 == 0 { p.round() } else { p };
+            let (along, alone) = (index.nearest_along(p, &mut trail), index.nearest(p));
+            assert_eq!(along, alone);
+            let distance = alone.unwrap().distance;
+            for limit in [0.0, 0.9 * distance, distance, 1.1 * distance] {
+                let beyond = index.nearest_beyond(p, limit, &mut trail);
+                assert_eq!(beyond, alone.filter(|found| found.distance > limit), "{k} {limit}");
+            }
+        }
+        // A trail of another index leads nowhere, but does no harm.
+        let single = SurfaceIndex::build(&plate(1));
+        assert_eq!(single.nearest_along(DVec3::ZERO, &mut trail), single.nearest(DVec3::ZERO));
+        assert_eq!(single.nearest_along(DVec3::NAN, &mut trail), None);
+    }
+}
