@@ -4,7 +4,7 @@
 //! the polyline alone. Curves that pass through a vertex without turning share their tangent there: the patches on
 //! both sides could not have a tangent plane otherwise.
 
-use crate::cholesky::Banded;
+use crate::banded::Banded;
 use crate::hermite;
 use crate::samples::arc_length;
 use topipe_mesh::DVec3;

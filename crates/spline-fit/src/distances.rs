@@ -5,7 +5,7 @@
 //! sample; now it is summed tile by tile, four by four in registers, and tiles that the large matrix does not ask for are left out:
 //! rows of control points that are given, and what lies above the diagonal.
 
-use crate::cholesky::Banded;
+use crate::banded::Banded;
 use crate::hermite;
 use crate::samples::Sample;
 use multiversion::multiversion;

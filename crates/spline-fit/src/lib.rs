@@ -21,6 +21,7 @@
 
 mod adapt;
 mod analytic_face;
+mod banded;
 pub mod basis;
 mod borders;
 mod breaks;
@@ -36,6 +37,7 @@ mod energy;
 mod error;
 mod fans;
 mod fit;
+mod fold;
 mod foot_points;
 mod frames;
 mod hermite;

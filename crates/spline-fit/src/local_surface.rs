@@ -4,7 +4,7 @@
 //! turned until the quadric's gradient vanishes. What comes out is smooth where the mesh is faceted or noisy, and the
 //! same for all patches that use it.
 
-use crate::cholesky::Banded;
+use crate::banded::Banded;
 use crate::samples::PatchSamples;
 use glam::DMat3;
 use topipe_mesh::DVec3;

@@ -4,8 +4,8 @@
 //! ribbon (see [`crate::ribbon`]) the control points beside it are given too. So the coordinates do not depend on each
 //! other, and a patch knows nothing of its neighbours: this is what makes it a unit of work of its own.
 
+use crate::banded::Banded;
 use crate::breaks::Breaks;
-use crate::cholesky::Banded;
 use crate::distances::add_distances;
 use crate::energy::Gram;
 use crate::hermite;
@@ -25,9 +25,6 @@ pub(crate) struct Border {
     pub(crate) ribbon: Option<Vec<DVec3>>,
 }
 
-/// Samples within this distance, in parameters, show how the mesh is turned somewhere: a third of a span of eight.
-const NEAR: f64 = 0.04;
-
 /// Control net of a patch: u fastest.
 #[derive(Debug, Clone)]
 pub(crate) struct Net {
@@ -37,36 +34,6 @@ pub(crate) struct Net {
 }
 
 impl Net {
-    /// The share of points, on a grid of about four points a span that includes the sides, where the patch is turned
-    /// over: its normal points away from the normals at the corners, blended, and from that of the mesh there, which may
-    /// turn over itself around a spike.
-    pub(crate) fn folded(&self, corners: &[DVec3; 4], samples: &PatchSamples) -> f64 {
-        let (nu, nv) = (2 * self.basis_u.len(), 2 * self.basis_v.len());
-        let mut folded = 0;
-        let spans = [self.basis_u.len() / 2 - 1, self.basis_v.len() / 2 - 1];
-        let columns: Vec<_> =
-            (0..=nu).map(|i| hermite::local_pair(spans, [i as f64 / nu as f64, 0.0])).collect();
-        let rows: Vec<_> =
-            (0..=nv).map(|j| hermite::local_pair(spans, [0.0, j as f64 / nv as f64])).collect();
-        for j in 0..=nv {
-            for i in 0..=nu {
-                let (u, v) = (i as f64 / nu as f64, j as f64 / nv as f64);
-                let ((column, values_u, slopes_u), (row, values_v, slopes_v)) = (&columns[i], &rows[j]);
-                let both = |along: &[DVec2; 4], across: &[DVec2; 4]| {
-                    std::array::from_fn(|k| DVec2::new(along[k].x, across[k].y))
-                };
-                let functions = ([column[0], row[1]], both(values_u, values_v), both(slopes_u, slopes_v));
-                let [a, b, c, d] = *corners;
-                let about = a.lerp(b, u).lerp(d.lerp(c, u), v);
-                let normal = self.combine(functions).normal();
-                let over = normal.dot(about) <= 0.0
-                    && !samples.near([u, v], NEAR).any(|sample| normal.dot(sample.normal) > 0.0);
-                folded += usize::from(over);
-            }
-        }
-        folded as f64 / ((nu + 1) * (nv + 1)) as f64
-    }
-
     /// The largest distance of a sample from the point with its parameters, mm.
     pub(crate) fn farthest(&self, samples: &PatchSamples) -> f64 {
         self.distances(samples).into_iter().fold(0.0, f64::max)
@@ -84,7 +51,10 @@ impl Net {
 
     /// The point where the functions have the given indices, values and slopes.
     #[inline]
-    fn combine(&self, ([i, j], values, slopes): ([usize; 2], [DVec2; 4], [DVec2; 4])) -> SurfacePoint {
+    pub(crate) fn combine(
+        &self,
+        ([i, j], values, slopes): ([usize; 2], [DVec2; 4], [DVec2; 4]),
+    ) -> SurfacePoint {
         let width = self.basis_u.len();
         // Coordinate by coordinate, what has the factors of the value and of the slope in u side by side.
         let (mut both, mut dv) = ([DVec2::ZERO; 3], [0.0; 3]);

@@ -10,7 +10,7 @@
 //! Around an odd number of edges that has a solution, around an even number up to one condition (the vertex
 //! enclosure problem, Peters 1991); it is solved by least squares, held weakly to the shape operator.
 
-use crate::cholesky::Banded;
+use crate::banded::Banded;
 use crate::local_surface::LocalSurface;
 use topipe_mesh::DVec3;
 
