@@ -83,6 +83,14 @@ impl Parameters {
         (self.tolerance * mesh.diagonal()).min(self.tolerance_mm.unwrap_or(f64::INFINITY))
     }
 
+    /// A patch all of whose samples are this near, mm, needs no more corrections of their foot points. The tolerance, rounded down to
+    /// a quarter of an octave: patches are kept under keys in which it counts, and an edit that changes the size of the part a
+    /// little shall find them again.
+    pub(crate) fn near_enough(&self, mesh: &TriangleMesh) -> f64 {
+        let tolerance = self.largest_distance(mesh);
+        if tolerance > 0.0 { ((4.0 * tolerance.log2()).floor() / 4.0).exp2() } else { 0.0 }
+    }
+
     /// Checks the ranges; returns the basis they describe.
     pub fn basis(&self) -> Result<Basis, SplineFitError> {
         let refuse = |field, value: String, range| Err(SplineFitError::Parameter { field, value, range });

@@ -60,11 +60,14 @@ impl Patches<'_> {
         borders: &[[Border; 4]],
         corners: &[[DVec3; 4]],
     ) -> Vec<UnitKey> {
+        let near_enough = self.parameters.near_enough(&self.setting.layout.part.mesh);
         samples
             .par_iter()
             .zip(borders)
             .zip(corners)
-            .map(|((samples, borders), corners)| unit::key(samples, borders, corners, self.parameters))
+            .map(|((samples, borders), corners)| {
+                unit::key(samples, borders, corners, self.parameters, near_enough)
+            })
             .collect()
     }
 
@@ -83,6 +86,7 @@ impl Patches<'_> {
         let keys = if units.are_kept() { self.keys(samples, &borders, &corners) } else { Vec::new() };
         units.announce("patches", &keys);
         let grams = grams(borders.iter());
+        let near_enough = parameters.near_enough(&layout.part.mesh);
         let done = AtomicU64::new(0);
         let mut before: Vec<Option<Fitted>> = before.into_iter().map(Some).collect();
         before.resize_with(samples.len(), || None);
@@ -98,7 +102,7 @@ impl Patches<'_> {
                     put(samples, &same.places);
                     return Ok(same);
                 }
-                let task = PatchTask::new(borders, corners, &grams, parameters);
+                let task = PatchTask::new(borders, corners, &grams, parameters, near_enough);
                 let compute = |samples: &mut PatchSamples| {
                     task.unfolded(samples).ok_or_else(|| {
                         let at = layout.part.mesh.position(layout.vertices[layout.corners(quad)[0] as usize]);
@@ -152,6 +156,8 @@ pub(crate) struct PatchTask<'a> {
     pub(crate) corners: &'a [DVec3; 4],
     grams: [&'a Gram; 2],
     parameters: &'a Parameters,
+    /// See [`Parameters::near_enough`], mm.
+    near_enough: f64,
 }
 
 impl<'a> PatchTask<'a> {
@@ -160,9 +166,10 @@ impl<'a> PatchTask<'a> {
         corners: &'a [DVec3; 4],
         grams: &'a [Gram],
         parameters: &'a Parameters,
+        near_enough: f64,
     ) -> Self {
         let grams = [0, 1].map(|k| &grams[borders[k].spans.ilog2() as usize]);
-        Self { borders, corners, grams, parameters }
+        Self { borders, corners, grams, parameters, near_enough }
     }
 
     /// A fit to the samples where they are, which move to their foot points on it.
@@ -172,11 +179,15 @@ impl<'a> PatchTask<'a> {
         Some(net)
     }
 
-    /// A fit, and fits to the foot points on the one before, with `factor` on the bending energy.
+    /// A fit, and fits to the foot points on the one before, with `factor` on the bending energy; until it is near enough. Fits that
+    /// went on saved neither deviation nor crossings, and cost a third of the time of all fits.
     fn attempt(&self, samples: &mut PatchSamples, factor: f64) -> Option<Net> {
         let bending = factor * (1.0 - self.parameters.lambda);
         let mut net = fit_patch(samples, self.borders, self.grams, bending)?;
         for _ in 0..self.parameters.foot_point_rounds {
+            if net.farthest(samples) <= self.near_enough {
+                break;
+            }
             crate::foot_points::correct(samples, |u, v| net.evaluate(u, v));
             net = fit_patch(samples, self.borders, self.grams, bending)?;
         }

@@ -31,13 +31,14 @@ impl Patches<'_> {
         samples: &mut [PatchSamples],
     ) -> Result<(), SplineFitError> {
         let tolerance = self.parameters.largest_distance(&self.setting.layout.part.mesh);
+        let near_enough = self.parameters.near_enough(&self.setting.layout.part.mesh);
         let grams = grams(fitted.iter().map(|f| &f.borders));
         fitted.par_iter_mut().zip(samples).try_for_each(|(fitted, samples)| {
             self.progress.check()?;
             if fitted.farthest <= tolerance {
                 return Ok(());
             }
-            let task = PatchTask::new(&fitted.borders, &fitted.corners, &grams, self.parameters);
+            let task = PatchTask::new(&fitted.borders, &fitted.corners, &grams, self.parameters, near_enough);
             if let Some(nearer) = nearer(&task, &fitted.net, samples, tolerance) {
                 fitted.net = nearer;
             }
@@ -147,7 +148,7 @@ mod tests {
     fn a_ridge_that_least_squares_cut_off_is_reached() {
         let (borders, corners, parameters) = (flat_borders(8), [DVec3::Z; 4], Parameters::default());
         let grams = grams([&borders].into_iter());
-        let task = PatchTask::new(&borders, &corners, &grams, &parameters);
+        let task = PatchTask::new(&borders, &corners, &grams, &parameters, 0.01);
         let mut samples = ridge();
         let net = task.fit(&mut samples, 1.0).unwrap();
         let before = net.farthest(&samples);
@@ -164,7 +165,7 @@ mod tests {
     fn a_patch_within_the_tolerance_stays() {
         let (borders, corners, parameters) = (flat_borders(8), [DVec3::Z; 4], Parameters::default());
         let grams = grams([&borders].into_iter());
-        let task = PatchTask::new(&borders, &corners, &grams, &parameters);
+        let task = PatchTask::new(&borders, &corners, &grams, &parameters, 0.01);
         let mut samples = ridge();
         let net = task.fit(&mut samples, 1.0).unwrap();
         assert!(nearer(&task, &net, &mut samples, 0.2).is_none());

@@ -17,9 +17,10 @@ pub(crate) fn key(
     borders: &[Border; 4],
     corners: &[DVec3; 4],
     parameters: &Parameters,
+    near_enough: f64,
 ) -> UnitKey {
     let mut hasher = UnitKey::of("spline patch")
-        .f64s(&[parameters.lambda, samples.area])
+        .f64s(&[parameters.lambda, samples.area, near_enough])
         .u64(parameters.foot_point_rounds.into());
     let mut numbers = Vec::new();
     for sample in &samples.samples {
