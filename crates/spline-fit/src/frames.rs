@@ -20,6 +20,14 @@ pub(crate) struct Frame {
     pub(crate) directions: Vec<DVec3>,
 }
 
+/// The frame of a sector and what it depends on, which is the same in many a refinement.
+#[derive(Debug, Default)]
+pub(crate) struct KnownFrame {
+    /// Radii of the local fits along its spokes, mm, and the common tangent of the creases through its vertex.
+    from: (Vec<f64>, Option<DVec3>),
+    frame: Option<Frame>,
+}
+
 /// The frames of all vertices.
 pub(crate) struct Frames {
     /// Positions of the macro-vertices.
@@ -125,7 +133,12 @@ pub(crate) fn crease_tangents(given: &Given<'_>) -> Vec<Option<DVec3>> {
 const CORNER: f64 = 0.342;
 
 impl Frames {
-    pub(crate) fn new(given: &Given<'_>, tangents: &[Option<DVec3>]) -> Result<Self, SplineFitError> {
+    /// Frames that are `known` from another call for the same setting are not computed again.
+    pub(crate) fn new(
+        given: &Given<'_>,
+        tangents: &[Option<DVec3>],
+        known: &mut Vec<KnownFrame>,
+    ) -> Result<Self, SplineFitError> {
         let layout = given.layout;
         let mesh = &layout.part.mesh;
         let sectors = &given.sectors.list;
@@ -140,17 +153,24 @@ impl Frames {
             let v = sector.vertex as usize;
             positions[v].get_or_insert(mesh.position(layout.vertices[v]));
         }
-        let frames: Vec<Frame> =
-            sectors
-                .par_iter()
-                .map(|sector| {
-                    let v = sector.vertex as usize;
-                    let at = positions[v].unwrap_or(mesh.position(layout.vertices[v]));
-                    frame(given, sector, at, positions[v].is_some(), tangents).ok_or(
-                        SplineFitError::Singular { what: "vertex", index: v, x: at.x, y: at.y, z: at.z },
-                    )
-                })
-                .collect::<Result<_, _>>()?;
+        known.resize_with(sectors.len(), KnownFrame::default);
+        let frames: Vec<Frame> = sectors
+            .par_iter()
+            .zip(known)
+            .map(|(sector, known)| {
+                let v = sector.vertex as usize;
+                let at = positions[v].unwrap_or(mesh.position(layout.vertices[v]));
+                let reach: Vec<f64> = sector.spokes.iter().map(|s| given.reach[s.edge as usize]).collect();
+                let from = (reach, tangents[v]);
+                if known.frame.is_none() || known.from != from {
+                    let frame = frame(given, sector, at, positions[v].is_some(), tangents);
+                    *known = KnownFrame { from, frame };
+                }
+                let singular =
+                    SplineFitError::Singular { what: "vertex", index: v, x: at.x, y: at.y, z: at.z };
+                known.frame.clone().ok_or(singular)
+            })
+            .collect::<Result<_, _>>()?;
         for (sector, frame) in sectors.iter().zip(&frames) {
             positions[sector.vertex as usize].get_or_insert(frame.surface.position);
         }

@@ -3,7 +3,7 @@
 use crate::SplineFitError;
 use crate::crease_curves;
 use crate::fans::{EdgeRole, Spoke};
-use crate::frames::{Frames, crease_tangents};
+use crate::frames::{Frames, KnownFrame, crease_tangents};
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
 use crate::smooth_curves::{InnerFits, SmoothCurve, smooth_curve};
@@ -25,22 +25,29 @@ impl Curve {
     }
 }
 
+/// Local fits that another network of the same setting has made.
+#[derive(Debug, Default)]
+pub(crate) struct KnownFits {
+    frames: Vec<KnownFrame>,
+    inner: Vec<InnerFits>,
+}
+
 /// Vertices and edges.
 pub(crate) struct Network {
     pub(crate) frames: Frames,
     pub(crate) curves: Vec<Curve>,
 }
 
-/// Finds vertices and edges; `spans` are those of the curves, `reach` the radii of the local fits, mm. Of each edge the
-/// local fits that are `known` from another network of this setting are not made again.
+/// Finds vertices and edges; `spans` are those of the curves, `reach` the radii of the local fits, mm. Local
+/// fits that are `known` from another network of this setting are not made again.
 pub(crate) fn network(
     setting: &Setting<'_>,
     samples: &[PatchSamples],
     spans: &[usize],
     reach: &[f64],
-    known: &mut Vec<InnerFits>,
+    known: &mut KnownFits,
 ) -> Result<Network, SplineFitError> {
-    known.resize_with(spans.len(), InnerFits::default);
+    known.inner.resize_with(spans.len(), InnerFits::default);
     let layout = setting.layout;
     let given = setting.given(samples, reach);
     let singular = |e: usize| {
@@ -48,8 +55,9 @@ pub(crate) fn network(
         SplineFitError::Singular { what: "edge", index: e, x: at.x, y: at.y, z: at.z }
     };
     let tangents = crease_tangents(&given);
-    let frames = Frames::new(&given, &tangents)?;
+    let frames = Frames::new(&given, &tangents, &mut known.frames)?;
     let mut smooth: Vec<Option<SmoothCurve>> = known
+        .inner
         .par_iter_mut()
         .enumerate()
         .map(|(e, known)| match setting.roles[e] {

@@ -10,7 +10,7 @@
 //! patch takes its normals along the border from the shape.
 use crate::hermite;
 use crate::knot_insertion::insert_knots;
-use crate::network::{Network, network};
+use crate::network::{KnownFits, Network, network};
 use crate::patch_fit::Net;
 use crate::patches::{Fitted, Patches};
 use crate::refinement::Refinement;
@@ -37,7 +37,7 @@ pub(crate) fn fit(
         samples.iter().map(|s| s.samples.iter().map(|s| [s.u, s.v]).collect()).collect();
     let patches = Patches { setting: &setting, parameters, units, progress };
     let mut before: Vec<Fitted> = Vec::new();
-    let mut known = Vec::new();
+    let mut known = KnownFits::default();
     loop {
         progress.check()?;
         // Each refinement starts from the same parameters: what a patch becomes does not depend on the way there.
@@ -72,8 +72,13 @@ pub(crate) fn first_patches(
     let mut setting = Setting::new(layout)?;
     setting.make_corners(samples, parameters.spans as usize, &progress);
     let refinement = Refinement::new(&setting, parameters);
-    let network =
-        network(&setting, samples, refinement.spans(), &refinement.reach(&setting), &mut Vec::new())?;
+    let network = network(
+        &setting,
+        samples,
+        refinement.spans(),
+        &refinement.reach(&setting),
+        &mut KnownFits::default(),
+    )?;
     let patches = Patches { setting: &setting, parameters, units: &Units::none(), progress: &progress };
     let (borders, corners) = patches.given(&network, refinement.spans());
     Ok(patches.keys(samples, &borders, &corners))
