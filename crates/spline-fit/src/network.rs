@@ -121,3 +121,30 @@ fn border_leg(setting: &Setting<'_>, spoke: Spoke) -> Option<Leg> {
     let at = curve.control[if spoke.reversed { curve.control.len() - 1 } else { 0 }];
     Some(Leg { turning: Some(shape.turning(at, leg.first)), ..leg })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::setting::tests::layout;
+
+    /// What is known from another refinement is what would be found without it, whatever has changed meanwhile.
+    #[test]
+    fn known_fits_change_nothing() {
+        let (layout, samples) = layout("y-form");
+        let setting = Setting::new(&layout).unwrap();
+        let edges = layout.edges.len();
+        let mut known = KnownFits::default();
+        let some = |step: usize, value: f64| move |e: usize| if e.is_multiple_of(step) { value } else { 1.0 };
+        for (step, finer, closer) in [(1, 1, 1.0), (7, 2, 1.0), (7, 2, 0.25), (5, 1, 0.5), (1, 1, 1.0)] {
+            let spans: Vec<usize> = (0..edges).map(|e| 4 * some(step, finer as f64)(e) as usize).collect();
+            let reach: Vec<f64> =
+                setting.reach(&spans).iter().enumerate().map(|(e, r)| r * some(step, closer)(e)).collect();
+            let found = network(&setting, &samples, &spans, &reach, &mut known).unwrap();
+            let fresh = network(&setting, &samples, &spans, &reach, &mut KnownFits::default()).unwrap();
+            assert_eq!(found.frames.positions, fresh.frames.positions);
+            for (found, fresh) in found.curves.iter().zip(&fresh.curves) {
+                assert_eq!((&found.control, &found.normals), (&fresh.control, &fresh.normals));
+            }
+        }
+    }
+}

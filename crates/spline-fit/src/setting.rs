@@ -133,13 +133,14 @@ impl<'a> Setting<'a> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::samples::{faces_by_quad, sample};
     use topipe_mesh::import::{ImportOptions, Source, read_source};
     use topipe_progress::Progress;
 
-    fn layout(name: &str) -> QuadLayout {
+    /// The layout of a part among the fixtures, with what is fitted.
+    pub(crate) fn layout(name: &str) -> (QuadLayout, Vec<PatchSamples>) {
         let place = format!("{}/../../fixtures/{name}/{name}", env!("CARGO_MANIFEST_DIR"));
         let silent = Progress::silent();
         let [bytes, labels] =
@@ -148,7 +149,11 @@ mod tests {
         let part = read_source(&source, &ImportOptions::default(), &silent).unwrap();
         let part = topipe_smoothing::smooth(&part, &Default::default(), &silent).unwrap();
         let tiling = topipe_tiling::tile(&part, &Default::default(), &silent).unwrap();
-        topipe_quad_matching::match_quads(&tiling, &Default::default(), &silent).unwrap()
+        let layout = topipe_quad_matching::match_quads(&tiling, &Default::default(), &silent).unwrap();
+        let faces = faces_by_quad(&layout);
+        let samples = faces.iter().enumerate().map(|(quad, faces)| sample(&layout, quad, faces).unwrap());
+        let samples = samples.collect();
+        (layout, samples)
     }
 
     /// Where two borders fix a tangent plane that is far from the mesh's, an edge between them becomes a crease; afterwards no
@@ -156,12 +161,7 @@ mod tests {
     #[test]
     fn corners_of_borders_become_creases_until_none_is_left() {
         for name in ["y-form", "bracket"] {
-            let layout = layout(name);
-            let samples: Vec<PatchSamples> = faces_by_quad(&layout)
-                .iter()
-                .enumerate()
-                .map(|(quad, faces)| sample(&layout, quad, faces).unwrap())
-                .collect();
+            let (layout, samples) = layout(name);
             let mut setting = Setting::new(&layout).unwrap();
             let (roles, tangent_to) = (setting.roles.clone(), setting.tangent_to.clone());
             let found = |setting: &Setting<'_>| {
