@@ -13,6 +13,7 @@ use crate::patch_fit::Net;
 use crate::patches::{Fitted, PatchTask, Patches, TIP, grams, places, put};
 use crate::samples::PatchSamples;
 use rayon::prelude::*;
+use topipe_mesh::DVec3;
 
 /// Fits of one patch.
 const ROUNDS: usize = 8;
@@ -94,19 +95,47 @@ fn nearer(task: &PatchTask<'_>, net: &Net, samples: &mut PatchSamples, tolerance
 fn overshoot(net: &Net, samples: &PatchSamples) -> f64 {
     let (nu, nv) = (net.basis_u.len(), net.basis_v.len());
     let grid = (0..=nv).flat_map(|j| (0..=nu).map(move |i| (i as f64 / nu as f64, j as f64 / nv as f64)));
-    // Coordinate by coordinate, for vector instructions.
-    let [x, y, z] = [0, 1, 2].map(|c| samples.samples.iter().map(|s| s.point[c]).collect::<Vec<f64>>());
-    let square = grid.map(|(u, v)| {
+    // Coordinate by coordinate, for vector instructions; a block of samples at a time.
+    let blocks: Vec<[[f64; BLOCK]; 3]> = samples
+        .samples
+        .chunks(BLOCK)
+        .map(|block| {
+            // The last sample fills the last block.
+            [0, 1, 2].map(|c| std::array::from_fn(|k| block[k.min(block.len() - 1)].point[c]))
+        })
+        .collect();
+    let mut farthest = 0.0;
+    // Neighbouring points are often near the same samples.
+    let mut last = 0;
+    for (u, v) in grid {
         let p = net.evaluate(u, v).position;
         let mut least = f64::INFINITY;
-        for ((x, y), z) in x.iter().zip(&y).zip(&z) {
-            let (x, y, z) = (x - p.x, y - p.y, z - p.z);
-            let square = x * x + y * y + z * z;
-            least = if square < least { square } else { least };
+        for k in 0..blocks.len() {
+            let block = (last + k) % blocks.len();
+            least = least.min(nearest_of(&blocks[block], p));
+            // Not the farthest point, whatever the other samples are.
+            if least <= farthest {
+                last = block;
+                break;
+            }
         }
-        least
-    });
-    square.fold(0.0, f64::max).sqrt()
+        // Also where there are no samples.
+        farthest = f64::max(farthest, if least.is_finite() { least } else { 0.0 });
+    }
+    farthest.sqrt()
+}
+
+/// Samples looked at together.
+const BLOCK: usize = 16;
+
+/// The smallest of the squared distances of points, coordinate by coordinate, from `p`.
+fn nearest_of([x, y, z]: &[[f64; BLOCK]; 3], p: DVec3) -> f64 {
+    let mut squares = [0.0; BLOCK];
+    for k in 0..BLOCK {
+        let (x, y, z) = (x[k] - p.x, y[k] - p.y, z[k] - p.z);
+        squares[k] = x * x + y * y + z * z;
+    }
+    squares.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -116,7 +145,6 @@ mod tests {
     use crate::hermite;
     use crate::patch_fit::Border;
     use crate::samples::Sample;
-    use topipe_mesh::DVec3;
 
     /// A plane with a ridge a tenth wide and a tenth high across it that ends before the borders.
     fn ridge() -> PatchSamples {
@@ -159,6 +187,29 @@ mod tests {
         assert!(nearer.folded(&corners, &samples) <= TIP);
         // What the fit began with is as it was.
         assert!(samples.samples.iter().all(|s| s.weight == 1.0 / 1600.0));
+    }
+
+    #[test]
+    fn a_patch_swings_out_as_far_as_its_farthest_point_is_from_all_samples() {
+        let (borders, corners, parameters) = (flat_borders(8), [DVec3::Z; 4], Parameters::default());
+        let grams = grams([&borders].into_iter());
+        let task = PatchTask::new(&borders, &corners, &grams, &parameters, 0.01);
+        let mut samples = ridge();
+        let net = task.fit(&mut samples, 1.0).unwrap();
+        for count in [1, 5, 33, samples.samples.len()] {
+            samples = PatchSamples { samples: ridge().samples[..count].to_vec(), ..samples };
+            let n = net.basis_u.len();
+            let point =
+                |k: usize| net.evaluate((k % (n + 1)) as f64 / n as f64, (k / (n + 1)) as f64 / n as f64);
+            let off = |k: usize| {
+                let p = point(k).position;
+                samples.samples.iter().map(|s| s.point.distance(p)).fold(f64::INFINITY, f64::min)
+            };
+            let farthest = (0..(n + 1) * (n + 1)).map(off).fold(0.0, f64::max);
+            assert!((overshoot(&net, &samples) - farthest).abs() < 1e-12, "{count} samples");
+        }
+        samples.samples.clear();
+        assert_eq!(overshoot(&net, &samples), 0.0);
     }
 
     #[test]
