@@ -78,22 +78,31 @@ impl Refiner {
 
     /// The half-edges that leave `vertex`, counter-clockwise.
     pub fn outgoing(&self, vertex: VertexId) -> Vec<HalfEdgeId> {
-        let first = self.outgoing[vertex.index()];
         let mut fan = Vec::with_capacity(8);
-        let mut h = first;
-        while h.is_some() {
-            fan.push(h);
-            h = self.twin(h.prev());
-            if h == first {
-                break;
-            }
-        }
+        fan.extend(self.around(vertex));
         fan
+    }
+
+    /// The same, one after the other.
+    #[inline]
+    pub fn around(&self, vertex: VertexId) -> impl Iterator<Item = HalfEdgeId> + '_ {
+        let first = self.outgoing[vertex.index()];
+        let mut next = first;
+        std::iter::from_fn(move || {
+            let h = next;
+            if h.is_some() {
+                next = self.twin(h.prev());
+                if next == first {
+                    next = HalfEdgeId::NONE;
+                }
+            }
+            h.is_some().then_some(h)
+        })
     }
 
     /// The half-edge from `a` to `b`, if there is one with a face on its left.
     pub fn half_edge(&self, a: VertexId, b: VertexId) -> Option<HalfEdgeId> {
-        self.outgoing(a).into_iter().find(|&h| self.target(h) == b)
+        self.around(a).find(|&h| self.target(h) == b)
     }
 
     /// The feature kind of the edge between `a` and `b`, if it is one.

@@ -10,7 +10,9 @@ mod star;
 
 use crate::QuadMatchingError;
 use crate::cost::{corner, taper};
+use crate::pairing::face_angle;
 use crate::refine::Regions;
+use crate::sides::Tiled;
 use crate::spokes::Cutter;
 use glam::DVec2;
 use marks::Scratch;
@@ -128,7 +130,7 @@ fn try_plans(
     snap: f64,
     scratch: &mut Scratch,
 ) -> bool {
-    let before = star_cost(regions, fan);
+    let before = star_cost(regions, fan, f64::INFINITY);
     if only_bad && before <= 0.0 {
         return false;
     }
@@ -165,8 +167,8 @@ fn path(regions: &Regions, (r, k): Corner) -> Vec<VertexId> {
 }
 
 /// The cost of the corners that edges from a vertex have to do with: those at the vertex, and at the far ends of the
-/// edges on either hand; and of the quads around it.
-fn star_cost(regions: &Regions, fan: &Fan) -> f64 {
+/// edges on either hand; and of the quads around it. Not all of it where that is more than `limit` already: no part is negative.
+fn star_cost(regions: &Regions, fan: &Fan, limit: f64) -> f64 {
     let at = |(r, k): Corner| {
         let side = regions.sides[r][k];
         let v = regions.vertices[regions.edges[side.edge as usize].ends[side.reversed as usize] as usize];
@@ -181,6 +183,9 @@ fn star_cost(regions: &Regions, fan: &Fan) -> f64 {
         }
         if fan.closed || i + 1 < fan.corners.len() {
             sum += at((r, (k + count - 1) % count));
+        }
+        if sum > limit {
+            break;
         }
     }
     sum
@@ -208,9 +213,11 @@ fn relax_one(
         regions.tiled.tile_of_face[f.index()] = id;
     }
     regions.tiled.begin();
-    let mut cutter = Cutter::within(id, border.iter().copied(), map, snap);
+    let mut cutter = Cutter::within(id, border, map, snap);
     let site = if fan.closed { cutter.center(&mut regions.tiled, faces, goal, CENTER) } else { vertex };
     let mut paths = Vec::with_capacity(targets.len());
+    // What the corners between the cuts so far cost, which later cuts do not change.
+    let mut known = 0.0;
     for &target in targets {
         match cutter.straight(&mut regions.tiled, site, target) {
             Some(path) => {
@@ -219,14 +226,20 @@ fn relax_one(
             }
             None => break,
         }
+        known += cut_cost(&regions.tiled, &paths);
+        if known > allowed + CERTAIN * (1.0 + allowed.abs()) {
+            break;
+        }
     }
     // With the pieces of the faces that were cut.
     let pieces = (first_new..regions.tiled.tile_of_face.len()).map(FaceId::new);
-    if paths.len() == targets.len() {
+    if paths.len() == targets.len() && known <= allowed + CERTAIN * (1.0 + allowed.abs()) {
         let all: Vec<FaceId> = faces.iter().copied().chain(pieces).collect();
         set(regions, spokes, &paths);
         regions.vertices[v] = site;
-        if fill(regions, &all, fan, (ring, &star.begins), scratch) && star_cost(regions, fan) <= allowed {
+        if fill(regions, &all, fan, (ring, &star.begins), scratch)
+            && star_cost(regions, fan, allowed) <= allowed
+        {
             regions.tiled.commit();
             return true;
         }
@@ -239,6 +252,53 @@ fn relax_one(
     }
     false
 }
+
+/// What the corners cost that the last of the paths makes: the two at its far end, and the one between it and the path before it.
+/// Faces outside of the star have another label.
+fn cut_cost(tiled: &Tiled, paths: &[Vec<VertexId>]) -> f64 {
+    let Some((path, before)) = paths.split_last() else { return 0.0 };
+    let refiner = &tiled.refiner;
+    let (site, last) = (path[0], path[path.len() - 1]);
+    let Some(back) = refiner.half_edge(last, path[path.len() - 2]) else { return 0.0 };
+    let mesh = &refiner.part().mesh;
+    let label = tiled.tile(back);
+    let wedge = |first: HalfEdgeId, next: &dyn Fn(HalfEdgeId) -> HalfEdgeId| -> f64 {
+        let (mut angle, mut h) = (0.0, first);
+        while h.is_some() && tiled.tile(h) == label {
+            angle += face_angle(mesh, h);
+            h = next(h);
+            if h == first {
+                return 0.0;
+            }
+        }
+        corner(angle)
+    };
+    let clockwise = |h: HalfEdgeId| match refiner.twin(h) {
+        g if g.is_some() => g.next(),
+        none => none,
+    };
+    let mut cost = wedge(back, &|h| refiner.twin(h.prev())) + wedge(clockwise(back), &clockwise);
+    if let Some(before) = before.last()
+        && let Some(first) = refiner.half_edge(site, before[1])
+    {
+        let end = path[1];
+        let mut angle = 0.0;
+        let mut h = first;
+        while refiner.target(h) != end {
+            angle += face_angle(mesh, h);
+            h = refiner.twin(h.prev());
+            if !h.is_some() || h == first {
+                return cost;
+            }
+        }
+        cost += corner(angle);
+    }
+    cost
+}
+
+/// An attempt is given up half way where the corners that are known cost more than this over what is allowed, relative and
+/// absolute: much more than rounding, as their angles are added up over other faces afterwards.
+const CERTAIN: f64 = 1e-4;
 
 /// A vertex nearer to the centre of the disk than this is taken for it: 0.1 of the radius turns edges by 6 degrees.
 const CENTER: f64 = 0.1;
@@ -313,4 +373,33 @@ fn fill(
         }
     }
     whole
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_4;
+    use topipe_mesh::refine::Refiner;
+    use topipe_mesh::{Part, TriangleMesh};
+
+    #[test]
+    fn a_cut_costs_what_the_corners_beside_it_do() {
+        // Nine points of a square, the middle one joined to all others.
+        let points = (0..9).map(|k| [f64::from(k % 3), f64::from(k / 3), 0.0]).collect();
+        let around = [0, 1, 2, 5, 8, 7, 6, 3];
+        let triangles = (0..8).map(|k| [4, around[k], around[(k + 1) % 8]]).collect();
+        let part = Part::new(TriangleMesh::from_arrays(points, triangles));
+        let mut tiled = Tiled::over(Refiner::new(&part).unwrap(), vec![0; 8]);
+        let to = |v: u32| vec![VertexId(4), VertexId(v)];
+        // Right angles cost nothing, half of them at both ends and between the two paths do.
+        let half = corner(FRAC_PI_4);
+        let cost = |tiled: &Tiled, paths: &[Vec<VertexId>]| cut_cost(tiled, paths);
+        assert_eq!(cost(&tiled, &[]), 0.0);
+        assert!(cost(&tiled, &[to(5)]) < 1e-12 && cost(&tiled, &[to(5), to(7)]) < 1e-12);
+        assert!((cost(&tiled, &[to(8)]) - 2.0 * half).abs() < 1e-12);
+        assert!((cost(&tiled, &[to(5), to(8)]) - 3.0 * half).abs() < 1e-12);
+        // Faces of another label are no part of a corner: here there is none left on one side.
+        tiled.tile_of_face[3] = 1;
+        assert!((cost(&tiled, &[to(8)]) - half - corner(0.0)).abs() < 1e-12);
+    }
 }

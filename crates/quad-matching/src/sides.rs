@@ -87,7 +87,7 @@ impl Tiled {
     /// The tiles around `vertex`, each once, counter-clockwise.
     pub(crate) fn tiles_around(&self, vertex: VertexId) -> Vec<u32> {
         let mut tiles: Vec<u32> = Vec::with_capacity(3);
-        for h in self.refiner.outgoing(vertex) {
+        for h in self.refiner.around(vertex) {
             let tile = self.tile(h);
             if !tiles.contains(&tile) {
                 tiles.push(tile);
@@ -115,8 +115,8 @@ impl Tiled {
     /// The angle of a tile at one of its vertices: that of its faces there, together.
     pub(crate) fn corner_angle(&self, vertex: VertexId, tile: u32) -> f64 {
         let mesh = &self.refiner.part().mesh;
-        let fan = self.refiner.outgoing(vertex);
-        fan.into_iter().filter(|&h| self.tile(h) == tile).map(|h| crate::pairing::face_angle(mesh, h)).sum()
+        let fan = self.refiner.around(vertex);
+        fan.filter(|&h| self.tile(h) == tile).map(|h| crate::pairing::face_angle(mesh, h)).sum()
     }
 
     fn length(&self, h: HalfEdgeId) -> f64 {

@@ -125,7 +125,8 @@ pub(crate) fn cut(
     map: Option<DiskMap>,
     snap: f64,
 ) -> Result<(VertexId, Vec<Vec<VertexId>>), QuadMatchingError> {
-    let mut cutter = Cutter::new(task, map.unwrap_or_default(), snap);
+    let border = task.border.iter().copied().collect();
+    let mut cutter = Cutter::within(task.tile, &border, map.unwrap_or_default(), snap);
     let site = match task.anchor {
         Some(vertex) => vertex,
         None => cutter.center(tiled, &task.faces, DVec2::ZERO, CENTER),
@@ -162,7 +163,8 @@ pub(crate) fn recut(
     old: &[VertexId],
     snap: f64,
 ) -> Vec<VertexId> {
-    let mut cutter = Cutter::new(task, map, snap);
+    let border = task.border.iter().copied().collect();
+    let mut cutter = Cutter::within(task.tile, &border, map, snap);
     let (from, to) = (old[0], old[old.len() - 1]);
     if let Some(path) = cutter.straight(tiled, from, to) {
         return path;
@@ -177,11 +179,11 @@ pub(crate) fn recut(
 }
 
 /// Cuts paths into the mesh of one tile, straight in its map.
-pub(crate) struct Cutter {
+pub(crate) struct Cutter<'a> {
     /// Edges that were cut, in order, and the vertices that cut them.
     cuts: Vec<([VertexId; 2], VertexId)>,
     map: DiskMap,
-    border: FxHashSet<VertexId>,
+    border: &'a FxHashSet<VertexId>,
     on_spoke: FxHashSet<VertexId>,
     spoke_edges: BTreeSet<[VertexId; 2]>,
     tile: u32,
@@ -192,16 +194,12 @@ fn key(a: VertexId, b: VertexId) -> [VertexId; 2] {
     if a < b { [a, b] } else { [b, a] }
 }
 
-impl Cutter {
-    fn new(task: &SpokeTask, map: DiskMap, snap: f64) -> Self {
-        Self::within(task.tile, task.border.iter().copied(), map, snap)
-    }
-
-    pub(crate) fn within(tile: u32, border: impl Iterator<Item = VertexId>, map: DiskMap, snap: f64) -> Self {
+impl<'a> Cutter<'a> {
+    pub(crate) fn within(tile: u32, border: &'a FxHashSet<VertexId>, map: DiskMap, snap: f64) -> Self {
         Self {
             cuts: Vec::new(),
             map,
-            border: border.collect(),
+            border,
             on_spoke: FxHashSet::default(),
             spoke_edges: BTreeSet::new(),
             tile,
@@ -214,12 +212,9 @@ impl Cutter {
         self.spoke_edges.extend(path.windows(2).map(|w| key(w[0], w[1])));
     }
 
-    fn orient(&self, a: VertexId, b: VertexId, c: VertexId) -> f64 {
-        let [a, b, c] = [a, b, c].map(|v| {
-            let p = self.map.at(v);
-            robust::Coord { x: p.x, y: p.y }
-        });
-        robust::orient2d(a, b, c)
+    fn place(&self, v: VertexId) -> robust::Coord<f64> {
+        let p = self.map.at(v);
+        robust::Coord { x: p.x, y: p.y }
     }
 
     /// The vertex nearest to a place in the disk, or a new one there when none is within `near`.
@@ -280,21 +275,32 @@ impl Cutter {
         // Each step crosses one edge; a straight line crosses none twice.
         let most = 10 * tiled.tile_of_face.len();
         for _ in 0..most {
-            let fan = tiled.refiner.outgoing(current);
             let inside = |h: HalfEdgeId| tiled.tile(h) == self.tile && !tiled.is_border(h);
-            if fan.iter().any(|&h| tiled.refiner.target(h) == target && inside(h)) {
+            if tiled.refiner.around(current).any(|h| tiled.refiner.target(h) == target && inside(h)) {
                 path.push(target);
                 return Some(path);
             }
+            let (from, to) = (self.place(current), self.place(target));
             let mut next = None;
-            for h in fan {
+            // What ends one wedge begins the next one.
+            let mut before = None;
+            for h in tiled.refiner.around(current) {
                 if tiled.tile(h) != self.tile {
                     continue;
                 }
                 let (a, b) = (tiled.refiner.target(h), tiled.refiner.origin(h.prev()));
-                let (to_a, to_b) = (self.orient(current, a, target), self.orient(current, b, target));
+                let (at_a, to_a) = before.filter(|&(v, _)| v == a).map_or_else(
+                    || {
+                        let at = self.place(a);
+                        (at, robust::orient2d(from, at, to))
+                    },
+                    |(_, known)| known,
+                );
+                let at_b = self.place(b);
+                let to_b = robust::orient2d(from, at_b, to);
+                before = Some((b, (at_b, to_b)));
                 // Inside the wedge, and not behind it.
-                if to_a >= 0.0 && to_b <= 0.0 && self.orient(current, a, b) > 0.0 {
+                if to_a >= 0.0 && to_b <= 0.0 && robust::orient2d(from, at_a, at_b) > 0.0 {
                     next = Some((h.next(), a, b, to_a, -to_b));
                     break;
                 }
@@ -356,7 +362,7 @@ impl Cutter {
         let mut from: FxHashMap<VertexId, VertexId> = FxHashMap::from_iter([(site, site)]);
         let mut queue = VecDeque::from([site]);
         while let Some(v) = queue.pop_front() {
-            for h in tiled.refiner.outgoing(v) {
+            for h in tiled.refiner.around(v) {
                 let w = tiled.refiner.target(h);
                 let inside = tiled.tile(h) == self.tile && !tiled.is_border(h);
                 let free = w == target || (!self.border.contains(&w) && !self.on_spoke.contains(&w));

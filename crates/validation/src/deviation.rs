@@ -175,7 +175,10 @@ fn between_samples(
     let high: Vec<usize> = (0..distances.len()).filter(|&k| distances[k].0 >= HIGH * found.0).collect();
     let tops: Vec<Option<(f64, DVec3)>> = high
         .into_par_iter()
-        .map_init(Trail::default, |trail, k| climb(k, &mut |p, limit| to.beyond(p, limit, trail)))
+        .map(|k| {
+            let mut trail = Trail::default();
+            climb(k, &mut |p, limit| to.beyond(p, limit, &mut trail))
+        })
         .collect();
     // The first of equal ones, for any number of threads.
     tops.into_iter().flatten().fold(found, |best, top| if top.0 > best.0 { top } else { best })

@@ -42,6 +42,12 @@ pub(super) struct Node {
 }
 
 impl Node {
+    /// The largest coordinate, without its sign.
+    #[inline]
+    pub(super) fn reach(&self) -> f64 {
+        self.low.abs().max(self.high.abs()).max_element()
+    }
+
     #[inline]
     pub(super) fn distance_squared(&self, p: DVec3) -> f64 {
         (self.low - p).max(p - self.high).max(DVec3::ZERO).length_squared()

@@ -1,7 +1,7 @@
 //! The point of a surface nearest to another.
 
-use super::bvh::{STACK, SurfaceIndex};
-use super::triangle::closest_point_within;
+use super::bvh::{Node, STACK, SurfaceIndex};
+use super::triangle::{closest_point_on_triangle, closest_point_within};
 use crate::FaceId;
 use glam::DVec3;
 
@@ -15,6 +15,10 @@ pub struct NearestPoint {
     /// The face it lies on; of several at the same distance the one with the lowest id.
     pub face: FaceId,
 }
+
+/// Distances are known to this part of the coordinates, and much better. The search looks so much farther than it has to, or else
+/// rounding would decide between triangles that are equally near.
+const NOISE: f64 = 1e-9;
 
 /// What one search leaves to the next one for a point near by, on the same index: the triangle that was found, so that nothing
 /// farther is looked at, and memory. It changes no answer.
@@ -71,23 +75,44 @@ impl SurfaceIndex {
         trail: &mut Trail,
         enough: impl Fn(f64) -> bool,
     ) -> Option<NearestPoint> {
-        let root = self.root?;
         if !point.is_finite() {
             return None;
         }
-        let mut best = limit * limit;
-        // The nearest point, its face, and the place of that in the index.
-        let mut found: Option<(DVec3, FaceId, u32)> = None;
-        let answer = |(point, face, _), best: f64| NearestPoint { distance: best.sqrt(), point, face };
-        let last = trail.last.filter(|&slot| (slot as usize) < self.corners.len());
-        let stack = &mut trail.stack;
-        stack[0] = (root.first, root.count, root.distance_squared(point));
-        // The triangle that was found last comes first.
-        let mut depth = 1;
-        if let Some(slot) = last {
-            stack[1] = (slot, 1, 0.0);
-            depth = 2;
+        let root = self.root?;
+        let most = limit * limit;
+        let mut found = None;
+        // The triangle that was found last only says how far to look: it is found again from the root, so that rounding of a
+        // distance against that of a box decides the same with and without a trail.
+        if let Some(slot) = trail.last
+            && let Some(&corners) = self.corners.get(slot as usize)
+        {
+            let q = closest_point_on_triangle(point, corners);
+            let d = point.distance_squared(q);
+            if d <= most && enough(d) {
+                let face = self.faces[slot as usize];
+                return Some(NearestPoint { distance: d.sqrt(), point: q, face });
+            }
+            let far = d.sqrt() + NOISE * (point.abs().max_element() + root.reach());
+            found = self.walk(&root, point, most.min(far * far), &mut trail.stack, &enough);
         }
+        let (q, slot, d) = found.or_else(|| self.walk(&root, point, most, &mut trail.stack, &enough))?;
+        trail.last = Some(slot);
+        Some(NearestPoint { distance: d.sqrt(), point: q, face: self.faces[slot as usize] })
+    }
+
+    /// The nearest point, the place of its triangle and the square of its distance, which is no more than `best`.
+    #[inline]
+    fn walk(
+        &self,
+        root: &Node,
+        point: DVec3,
+        mut best: f64,
+        stack: &mut [(u32, u32, f64); STACK],
+        enough: &impl Fn(f64) -> bool,
+    ) -> Option<(DVec3, u32, f64)> {
+        let mut found: Option<(DVec3, u32)> = None;
+        stack[0] = (root.first, root.count, root.distance_squared(point));
+        let mut depth = 1;
         while depth > 0 {
             depth -= 1;
             let (first, count, distance) = stack[depth];
@@ -99,14 +124,12 @@ impl SurfaceIndex {
                     let corners = self.corners[slot as usize];
                     let Some(q) = closest_point_within(point, corners, best) else { continue };
                     let d = point.distance_squared(q);
-                    let face = self.faces[slot as usize];
-                    if d < best || (d == best && found.is_none_or(|(_, f, _)| face < f)) {
+                    let is_lower = |other: u32| self.faces[slot as usize] < self.faces[other as usize];
+                    if d < best || (d == best && found.is_none_or(|(_, other)| is_lower(other))) {
                         best = d;
-                        let now = (q, face, slot);
-                        found = Some(now);
+                        found = Some((q, slot));
                         if enough(d) {
-                            trail.last = Some(slot);
-                            return Some(answer(now, best));
+                            return Some((q, slot, d));
                         }
                     }
                 }
@@ -120,9 +143,7 @@ impl SurfaceIndex {
             }
             depth += 2;
         }
-        let found = found?;
-        trail.last = Some(found.2);
-        Some(answer(found, best))
+        found.map(|(q, slot)| (q, slot, best))
     }
 }
 

@@ -29,9 +29,10 @@ pub(super) fn closest_point_within(p: DVec3, [a, b, c]: [DVec3; 3], limit: f64) 
         let far = limit * area2 * (1.0 + SLACK);
         let beyond = |side: f64, edge2: f64| side < 0.0 && side * side + h * h * edge2 > far * edge2;
         if beyond(v, ac2) || beyond(w, ab2) || beyond(u, bc2) {
-            // Rounding of the products, in slivers that of the normal, must be far below the limit.
+            // Rounding of the products, in slivers that of the normal, must be far below the limit, and that of coordinates too.
             let (short, long) = (ab2.min(ac2).min(bc2), ab2.max(ac2).max(bc2));
-            if limit * area2 * short > NOISE * ap.length_squared() * long * long * long {
+            let size = ap.length_squared() + p.length_squared();
+            if limit * area2 * short > NOISE * size * long * long * long {
                 return None;
             }
         }
@@ -124,6 +125,20 @@ mod tests {
             prop_assert!(p.distance(q) <= p.distance(other) + 1e-12);
             let on_itself = closest_point_on_triangle(q, [a, b, c]);
             prop_assert!(q.distance(on_itself) < 1e-7);
+        }
+
+        /// The nearest point is found within its own distance, also where that is nothing but rounding, at corners most of all.
+        #[test]
+        fn what_is_near_enough_is_not_left_out(
+            a in point(), b in point(), c in point(), off in point(), places in 0..20, corner in 0..4usize, s in 0.0..1.0,
+        ) {
+            let at: DVec3 = [a, b, c, a + (b - a) * s][corner] + off * 10f64.powi(-places);
+            let corners = [a, b, c].map(|q| q * 30.0);
+            let p = at * 30.0;
+            let q = closest_point_on_triangle(p, corners);
+            for limit in [1.0, 1.0 + 1e-12, 2.0, 100.0].map(|times| times * p.distance_squared(q)) {
+                prop_assert_eq!(closest_point_within(p, corners, limit), Some(q));
+            }
         }
 
         /// A line aimed at an inner point of the triangle crosses it there.

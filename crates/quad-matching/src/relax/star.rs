@@ -101,7 +101,8 @@ impl<'a> Star<'a> {
         })
     }
 
-    /// The map to the disk with the border as planned; none where there is none that is one-to-one.
+    /// The map to the disk with the border as planned; none where there is none that is one-to-one, or no other than for a plan
+    /// before.
     pub(super) fn map(&mut self, mesh: &TriangleMesh, plan: Plan, numbers: &mut Numbers) -> Option<&DiskMap> {
         let at = plan as usize;
         if self.maps[at].is_none() {
@@ -127,8 +128,24 @@ impl<'a> Star<'a> {
                 (1..n).for_each(|i| angles[i] = sector * along[begins[i]] / total);
             }
         }
+        // Shear is seen in the map with equal angles, which has been tried before: where there is none, there is nothing else to try.
+        let equal = match plan {
+            Plan::Sheared => self.maps[Plan::Equal as usize].as_ref(),
+            _ => None,
+        };
         let mut map = None;
         for round in 0..=SHEAR_ROUNDS {
+            if let Some(equal) = equal.filter(|_| round == 0) {
+                let Some(equal) = equal else { break };
+                let better = shear(mesh, faces, equal).and_then(|shear| equal_on_surface(shear, n, sector));
+                let Some(better) = better else { break };
+                let change = turned(&angles, &better);
+                angles = better;
+                if change < 0.1 {
+                    break;
+                }
+                continue;
+            }
             let mut fixed: FxHashMap<VertexId, DVec2> =
                 FxHashMap::with_capacity_and_hasher(border.len(), Default::default());
             for i in 0..n {
@@ -155,7 +172,7 @@ impl<'a> Star<'a> {
             map = Some(solved);
             let Some(shear) = sheared else { break };
             let Some(better) = equal_on_surface(shear, n, sector) else { break };
-            let change = angles.iter().zip(&better).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let change = turned(&angles, &better);
             angles = better;
             if change < 0.1 {
                 break;
@@ -163,6 +180,11 @@ impl<'a> Star<'a> {
         }
         map
     }
+}
+
+/// The largest difference of angles.
+fn turned(before: &[f64], after: &[f64]) -> f64 {
+    before.iter().zip(after).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
 /// How often the map is computed anew for the shear it has at the centre.
@@ -240,7 +262,7 @@ fn place(
 fn flood(tiled: &Tiled, vertex: VertexId, members: &[usize], seen: &mut Marks) -> Vec<FaceId> {
     let inside = |f: FaceId| members.contains(&(tiled.tile_of_face[f.index()] as usize));
     let mut faces: Vec<FaceId> =
-        tiled.refiner.outgoing(vertex).iter().map(|h| h.face()).filter(|&f| inside(f)).collect();
+        tiled.refiner.around(vertex).map(HalfEdgeId::face).filter(|&f| inside(f)).collect();
     seen.clear(tiled.tile_of_face.len());
     faces.iter().for_each(|f| _ = seen.set(f.index()));
     let mut next = 0;
