@@ -130,7 +130,7 @@ mod tests {
         /// The nearest point is found within its own distance, also where that is nothing but rounding, at corners most of all.
         #[test]
         fn what_is_near_enough_is_not_left_out(
-            a in point(), b in point(), c in point(), off in point(), places in 0..20, corner in 0..4usize, s in 0.0..1.0,
+            a in point(), b in point(), c in point(), off in point(), places in 0..20i32, corner in 0..4usize, s in 0.0..1.0,
         ) {
             let at: DVec3 = [a, b, c, a + (b - a) * s][corner] + off * 10f64.powi(-places);
             let corners = [a, b, c].map(|q| q * 30.0);
