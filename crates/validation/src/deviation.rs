@@ -15,16 +15,16 @@ use topipe_mesh::{DVec3, TriangleMesh};
 const CHUNK: usize = 1024;
 
 /// From the nearest point of the triangulation to the distance from the true surface.
-pub(crate) type Refine<'a> = Box<dyn Fn(DVec3, &NearestPoint) -> f64 + Sync + 'a>;
+pub(crate) type Refine<'a> = Box<dyn Fn(DVec3, &NearestPoint) -> f64 + Send + Sync + 'a>;
 
 /// From a point and a distance that was found for it to the distance from the nearest place of all.
-pub(crate) type Search<'a> = Box<dyn Fn(DVec3, f64) -> f64 + Sync + 'a>;
+pub(crate) type Search<'a> = Box<dyn Fn(DVec3, f64) -> f64 + Send + Sync + 'a>;
 
 /// The distance of a point, where it is larger than a number.
 pub(crate) type Beyond<'b> = dyn FnMut(DVec3, f64) -> Option<f64> + 'b;
 
 /// From a sample to the place near it where a distance is largest: that distance, and the place. `None` where a sample is not moved.
-pub(crate) type Climb<'a> = Box<dyn Fn(usize, &mut Beyond<'_>) -> Option<(f64, DVec3)> + Sync + 'a>;
+pub(crate) type Climb<'a> = Box<dyn Fn(usize, &mut Beyond<'_>) -> Option<(f64, DVec3)> + Send + Sync + 'a>;
 
 /// Samples with this part of the largest distance of all are moved to where it is largest.
 const HIGH: f64 = 0.3;
@@ -65,13 +65,12 @@ impl<'a> Surface<'a> {
     }
 
     pub(crate) fn of_samples(
-        triangulation: &TriangleMesh,
+        index: SurfaceIndex,
         samples: Vec<(DVec3, f64)>,
         refine: Refine<'a>,
         search: Search<'a>,
         climb: Climb<'a>,
     ) -> Self {
-        let index = SurfaceIndex::build(triangulation);
         let order = OnceLock::new();
         Self { index, samples, order, refine: Some(refine), search: Some(search), climb: Some(climb) }
     }

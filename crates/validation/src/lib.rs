@@ -145,8 +145,12 @@ pub fn validate(
         Some(surface) => {
             step()?;
             surface::check(surface)?;
-            let mut figures = surface::figures(surface, reference_part, reference, parameters, progress)?;
-            let sampled = surface::sample(surface, reference_part.mesh.mean_edge_length());
+            // Either has long parts that only one thread can do.
+            let (figures, sampled) = rayon::join(
+                || surface::figures(surface, reference_part, reference, parameters, progress),
+                || surface::sample(surface, reference_part.mesh.mean_edge_length()),
+            );
+            let mut figures = figures?;
             progress.check()?;
             figures.deviation = deviation::between(reference, &sampled, diagonal);
             progress.check()?;

@@ -4,7 +4,7 @@ use super::climb;
 use crate::deviation::{Beyond, Surface};
 use rayon::prelude::*;
 use std::sync::Arc;
-use topipe_mesh::spatial::NearestPoint;
+use topipe_mesh::spatial::{NearestPoint, SurfaceIndex};
 use topipe_mesh::{DVec3, RegionShape, TriangleMesh, VertexId};
 use topipe_spline_fit::{Basis, Patch, SplineSurface};
 
@@ -73,24 +73,24 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
         let patch = begins.partition_point(|&(first, _)| first <= sample) - 1;
         Some(climb::climb(&surface.patches[patch], place, begins[patch].1, beyond))
     };
-    let triangulation = mesh.clone();
+    let index = SurfaceIndex::build(&mesh);
     let boxes: Vec<[DVec3; 2]> = surface.patches.iter().map(bounds).collect();
     let refine = move |p: DVec3, nearest: &NearestPoint| {
         let face = nearest.face.index();
         if face >= in_patches {
             let shape = &surface.faces[face_of_triangle[face - in_patches] as usize].shape;
-            return to_shape(shape, p, triangulation.corners(nearest.face), nearest.point);
+            return to_shape(shape, p, mesh.corners(nearest.face), nearest.point);
         }
         let patch = &surface.patches[patch_of_face[face] as usize];
-        let [a, b, c] = triangulation.triangles[face].map(VertexId::index);
-        let weights = barycentric(triangulation.corners(nearest.face), nearest.point);
+        let [a, b, c] = mesh.triangles[face].map(VertexId::index);
+        let weights = barycentric(mesh.corners(nearest.face), nearest.point);
         let start = [0, 1].map(|k| {
             weights[0] * parameters[a][k] + weights[1] * parameters[b][k] + weights[2] * parameters[c][k]
         });
         distance(patch, p, start)
     };
     let search = move |p: DVec3, found: f64| nearest_of_all(surface, &boxes, p, found);
-    Surface::of_samples(&mesh, samples, Box::new(refine), Box::new(search), Box::new(climb))
+    Surface::of_samples(index, samples, Box::new(refine), Box::new(search), Box::new(climb))
 }
 
 /// The distance from `p` to a face of known shape, given the nearest point of its triangulation.

@@ -6,6 +6,7 @@
 
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 use topipe_mesh::DVec3;
 use topipe_spline_fit::{Basis, SplineSurface};
 
@@ -30,9 +31,19 @@ pub(super) fn gauss(count: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
+/// Rules that are asked for once for each curve and patch.
+static RULES: [OnceLock<Vec<(f64, f64)>>; 24] = [const { OnceLock::new() }; 24];
+
 /// Nodes and weights on all knot spans of a basis.
 pub(super) fn composite(basis: &Basis, count: usize) -> Vec<(f64, f64)> {
-    let rule = gauss(count);
+    let other;
+    let rule = match RULES.get(count) {
+        Some(known) => known.get_or_init(|| gauss(count)),
+        None => {
+            other = gauss(count);
+            &other
+        }
+    };
     let breaks = basis.breaks();
     breaks
         .windows(2)
