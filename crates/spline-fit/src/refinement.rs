@@ -152,14 +152,18 @@ fn is_far(setting: &Setting<'_>, network: &Network, index: &SurfaceIndex, limit:
     let count = POINTS * (control.len() / 2 - 1);
     let curve: Vec<DVec3> =
         (0..=count).map(|k| hermite::derivatives(control, k as f64 / count as f64)[0]).collect();
-    if curve.iter().any(|&p| !index.is_within(p, limit)) {
+    let layout = setting.layout;
+    let path: Vec<DVec3> = layout.edges[e].path.iter().map(|&v| layout.part.mesh.position(v)).collect();
+    // The path lies on the mesh: what is near it need not be looked for.
+    if curve.iter().any(|&p| off(p, &path) > limit && !index.is_within(p, limit)) {
         return true;
     }
-    let edge = &setting.layout.edges[e];
-    edge.path.iter().map(|&v| setting.layout.part.mesh.position(v)).any(|p| {
-        let off = curve.windows(2).map(|w| distance(p, w[0], w[1])).fold(f64::INFINITY, f64::min);
-        off > limit
-    })
+    path.iter().any(|&p| off(p, &curve) > limit)
+}
+
+/// The distance of a point from a polyline.
+fn off(p: DVec3, line: &[DVec3]) -> f64 {
+    line.windows(2).map(|w| distance(p, w[0], w[1])).fold(f64::INFINITY, f64::min)
 }
 
 /// The distance of a point from a segment.
