@@ -49,6 +49,9 @@ impl fmt::Debug for UnitKey {
 #[must_use = "a key is made by `finish`"]
 pub struct UnitKeyHasher(blake3::Hasher);
 
+/// Numbers hashed together.
+const BLOCK: usize = 2048;
+
 impl UnitKeyHasher {
     /// Adds bytes.
     pub fn bytes(mut self, bytes: &[u8]) -> Self {
@@ -65,8 +68,9 @@ impl UnitKeyHasher {
     /// Adds numbers bit by bit: 0.0 and -0.0 are two values.
     pub fn f64s(mut self, values: &[f64]) -> Self {
         self.0.update(&(values.len() as u64 * 8).to_le_bytes());
-        for chunk in values.chunks(128) {
-            let mut bytes = [0u8; 1024];
+        // In blocks of many chunks of the hash, which are hashed side by side.
+        let mut bytes = [0u8; 8 * BLOCK];
+        for chunk in values.chunks(BLOCK) {
             for (to, value) in bytes.chunks_exact_mut(8).zip(chunk) {
                 to.copy_from_slice(&value.to_le_bytes());
             }

@@ -32,6 +32,8 @@ pub(crate) struct Patches<'a> {
     pub(crate) parameters: &'a Parameters,
     pub(crate) units: &'a Units,
     pub(crate) progress: &'a Progress,
+    /// The keys of the samples as they begin, where patches are kept.
+    pub(crate) samples: Vec<UnitKey>,
 }
 
 impl Fitted {
@@ -54,18 +56,13 @@ impl Patches<'_> {
     }
 
     /// The keys under which the patches are kept.
-    pub(crate) fn keys(
-        &self,
-        samples: &[PatchSamples],
-        borders: &[[Border; 4]],
-        corners: &[[DVec3; 4]],
-    ) -> Vec<UnitKey> {
+    pub(crate) fn keys(&self, borders: &[[Border; 4]], corners: &[[DVec3; 4]]) -> Vec<UnitKey> {
         let near_enough = self.parameters.near_enough(&self.setting.layout.part.mesh);
-        samples
+        self.samples
             .par_iter()
             .zip(borders)
             .zip(corners)
-            .map(|((samples, borders), corners)| {
+            .map(|((&samples, borders), corners)| {
                 unit::key(samples, borders, corners, self.parameters, near_enough)
             })
             .collect()
@@ -80,10 +77,10 @@ impl Patches<'_> {
         spans: &[usize],
         before: Vec<Fitted>,
     ) -> Result<Vec<Fitted>, SplineFitError> {
-        let Self { setting, parameters, units, progress } = *self;
+        let Self { setting, parameters, units, progress, .. } = *self;
         let layout = setting.layout;
         let (borders, corners) = self.given(network, spans);
-        let keys = if units.are_kept() { self.keys(samples, &borders, &corners) } else { Vec::new() };
+        let keys = if units.are_kept() { self.keys(&borders, &corners) } else { Vec::new() };
         units.announce("patches", &keys);
         let grams = grams(borders.iter());
         let near_enough = parameters.near_enough(&layout.part.mesh);

@@ -17,7 +17,9 @@ use crate::refinement::Refinement;
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
 use crate::simplify::simplify;
+use crate::unit::key_of;
 use crate::{CurveShape, EdgeCurve, Parameters, Patch, PatchSide, SplineFitError, SplineSurface};
+use rayon::prelude::*;
 use topipe_progress::{Progress, UnitKey, Units};
 use topipe_quad_matching::QuadLayout;
 
@@ -35,7 +37,8 @@ pub(crate) fn fit(
     let mut refinement = Refinement::new(&setting, parameters);
     let places: Vec<Vec<[f64; 2]>> =
         samples.iter().map(|s| s.samples.iter().map(|s| [s.u, s.v]).collect()).collect();
-    let patches = Patches { setting: &setting, parameters, units, progress };
+    let keys = if units.are_kept() { samples.par_iter().map(key_of).collect() } else { Vec::new() };
+    let patches = Patches { setting: &setting, parameters, units, progress, samples: keys };
     let mut before: Vec<Fitted> = Vec::new();
     let mut known = KnownFits::default();
     loop {
@@ -79,9 +82,11 @@ pub(crate) fn first_patches(
         &refinement.reach(&setting),
         &mut KnownFits::default(),
     )?;
-    let patches = Patches { setting: &setting, parameters, units: &Units::none(), progress: &progress };
+    let keys = samples.par_iter().map(key_of).collect();
+    let patches =
+        Patches { setting: &setting, parameters, units: &Units::none(), progress: &progress, samples: keys };
     let (borders, corners) = patches.given(&network, refinement.spans());
-    Ok(patches.keys(samples, &borders, &corners))
+    Ok(patches.keys(&borders, &corners))
 }
 
 fn assemble(setting: &Setting<'_>, network: Network, nets: Vec<Net>) -> SplineSurface {

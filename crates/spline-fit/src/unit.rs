@@ -11,23 +11,29 @@ use crate::{Parameters, SplineFitError};
 use topipe_mesh::DVec3;
 use topipe_progress::{UnitKey, Units};
 
+/// The key of what a patch is fitted to, with the parameters that its samples begin with.
+pub(crate) fn key_of(samples: &PatchSamples) -> UnitKey {
+    let mut numbers = Vec::with_capacity(6 * samples.samples.len() + 1);
+    numbers.push(samples.area);
+    for sample in &samples.samples {
+        numbers.extend(sample.point.to_array());
+        numbers.extend([sample.u, sample.v, sample.weight]);
+    }
+    UnitKey::of("samples of a spline patch").f64s(&numbers).finish()
+}
+
 /// The key of a patch.
 pub(crate) fn key(
-    samples: &PatchSamples,
+    samples: UnitKey,
     borders: &[Border; 4],
     corners: &[DVec3; 4],
     parameters: &Parameters,
     near_enough: f64,
 ) -> UnitKey {
     let mut hasher = UnitKey::of("spline patch")
-        .f64s(&[parameters.lambda, samples.area, near_enough])
+        .key(samples)
+        .f64s(&[parameters.lambda, near_enough])
         .u64(parameters.foot_point_rounds.into());
-    let mut numbers = Vec::new();
-    for sample in &samples.samples {
-        numbers.extend(sample.point.to_array());
-        numbers.extend([sample.u, sample.v, sample.weight]);
-    }
-    hasher = hasher.f64s(&numbers);
     for border in borders {
         let flat = |points: &[DVec3]| points.iter().flat_map(|p| p.to_array()).collect::<Vec<f64>>();
         hasher = hasher
