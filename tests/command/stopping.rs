@@ -182,8 +182,8 @@ fn stopped_in_the_fit(shop: &Workshop, percent: u64, signal: &str) -> (u64, u64)
 #[cfg(unix)]
 #[test]
 fn a_fit_interrupted_and_killed_near_its_end_is_taken_up_there() {
-    // Slow patches, so that there is time between two reports of how far it is.
-    let slow = FIT.replace("refinements = 0", "refinements = 0\nfoot_point_rounds = 20");
+    // Slow patches, none of which is ever near enough, so that there is time between two reports of how far it is.
+    let slow = FIT.replace("refinements = 0", "refinements = 0\ntolerance = 1e-9\nfoot_point_rounds = 20");
     assert_ne!(slow, FIT);
     let killed = Workshop::with_part("y-form", &slow);
     // First it is asked to stop, at a third; then it is killed.
