@@ -28,7 +28,8 @@ pub struct Parameters {
     /// Times the spans may be doubled, up to 8, where the surface is not within `tolerance`, and once more along edges that are then
     /// still farther from the mesh than that by half.
     pub refinements: u32,
-    /// Largest distance of the mesh from the surface that is not refined, over the diagonal of the part.
+    /// Largest distance of the mesh from the surface that is not refined, and within which foot points are not corrected again, over
+    /// the diagonal of the part.
     pub tolerance: f64,
     /// The same in mm; the narrower of both counts.
     pub tolerance_mm: Option<f64>,
@@ -42,7 +43,7 @@ pub struct Parameters {
     /// Weight of the distance to the mesh against the bending energy, in (0, 1] (source, section 2.3). With common tangents
     /// points of the mesh that are beyond the tolerance weigh more, and the bending energy does where a patch would fold.
     pub lambda: f64,
-    /// Rounds in which the parameters of the mesh points are moved to the foot points on the last fit.
+    /// Most rounds in which the parameters of the mesh points are moved to the foot points on the last fit.
     pub foot_point_rounds: u32,
 }
 
