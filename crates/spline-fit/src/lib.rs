@@ -72,4 +72,6 @@ pub use error::SplineFitError;
 pub use fit::{first_patches, fit};
 pub use parameters::{Continuity, Parameters};
 pub use shells::{Shell, shells};
-pub use surface::{AnalyticFace, CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface, SurfacePoint};
+pub use surface::{
+    AnalyticFace, Column, CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface, SurfacePoint,
+};

@@ -2,6 +2,7 @@
 
 use crate::basis::{Basis, Local};
 use crate::energy::gauss;
+use crate::surface::Column;
 use crate::{Patch, SplineSurface};
 use rayon::prelude::*;
 use topipe_mesh::DVec3;
@@ -23,13 +24,18 @@ pub struct Shell {
 /// polynomial pieces.
 fn volume(patch: &Patch, center: DVec3) -> f64 {
     // The integrand has degree 3 p - 1 in each direction.
-    let (spans_u, spans_v) = (Span::all(&patch.basis_u), Span::all(&patch.basis_v));
+    let spans_v = Span::all(&patch.basis_v);
+    let spans_u = Span::all(&patch.basis_u).into_iter().map(|Span { length, points }| Span {
+        length,
+        points: points.iter().map(|(u, weight)| (patch.column(u), *weight)).collect(),
+    });
+    let spans_u: Vec<Span<Column>> = spans_u.collect();
     let mut sum = 0.0;
     for span_v in &spans_v {
         for span_u in &spans_u {
             for (v, wy) in &span_v.points {
                 for (u, wx) in &span_u.points {
-                    let at = patch.evaluate_at(u, v);
+                    let at = u.evaluate(v);
                     let weight = wx * wy * span_u.length * span_v.length;
                     sum += weight * (at.position - center).dot(at.du.cross(at.dv));
                 }
@@ -39,13 +45,13 @@ fn volume(patch: &Patch, center: DVec3) -> f64 {
     sum / 3.0
 }
 
-/// A span of a basis: its functions at the points of a quadrature, with the weights.
-struct Span {
+/// A span of a basis: its functions at the points of a quadrature, or what follows from them, with the weights.
+struct Span<T> {
     length: f64,
-    points: Vec<(Local, f64)>,
+    points: Vec<(T, f64)>,
 }
 
-impl Span {
+impl Span<Local> {
     fn all(basis: &Basis) -> Vec<Self> {
         let rule = gauss(3 * basis.degree() / 2 + 1);
         let span = |ends: &[f64]| {

@@ -5,7 +5,7 @@
 
 mod trimmed;
 
-use crate::basis::Local;
+use crate::surface::Column;
 use crate::{Basis, CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface};
 use topipe_mesh::{DVec3, RegionShape, TriangleMesh, VertexId};
 
@@ -185,10 +185,11 @@ fn add_patch(mesh: &mut TriangleMesh, patch: &Patch, sides: &[Vec<VertexId>], to
     let (nu, nv) = grid_size(patch, sides, tolerance);
     let first = mesh.positions.len();
     // Inner grid points (i, j) with 1 <= i < nu, 1 <= j < nv.
-    let columns: Vec<Local> = (1..nu).map(|i| patch.basis_u.evaluate(i as f64 / nu as f64)).collect();
+    let columns: Vec<Column> =
+        (1..nu).map(|i| patch.column(&patch.basis_u.evaluate(i as f64 / nu as f64))).collect();
     for j in 1..nv {
         let row = patch.basis_v.evaluate(j as f64 / nv as f64);
-        mesh.positions.extend(columns.iter().map(|column| patch.evaluate_at(column, &row).position));
+        mesh.positions.extend(columns.iter().map(|column| column.evaluate(&row).position));
     }
     let at = |i: usize, j: usize| VertexId::new(first + (j - 1) * (nu - 1) + i - 1);
     for j in 1..nv - 1 {

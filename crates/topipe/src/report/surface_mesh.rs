@@ -34,9 +34,9 @@ pub(super) fn surface_mesh(surface: &SplineSurface) -> (TriangleMesh, Vec<u32>) 
         let first = mesh.positions.len();
         let along =
             |basis: &Basis| -> Vec<_> { (0..=n).map(|k| basis.evaluate(k as f64 / n as f64)).collect() };
-        let columns = along(&patch.basis_u);
+        let columns: Vec<_> = along(&patch.basis_u).iter().map(|u| patch.column(u)).collect();
         for row in along(&patch.basis_v) {
-            mesh.positions.extend(columns.iter().map(|column| patch.evaluate_at(column, &row).position));
+            mesh.positions.extend(columns.iter().map(|column| column.evaluate(&row).position));
         }
         let at = |i: usize, j: usize| VertexId::new(first + j * (n + 1) + i);
         for j in 0..n {

@@ -124,10 +124,11 @@ fn grid(patch: &Patch, spacing: f64) -> Grid {
         (0..=cells).map(|k| (place(k), basis.evaluate(place(k)))).collect()
     };
     let (columns, rows) = (places(cells[0], &patch.basis_u), places(cells[1], &patch.basis_v));
+    let columns: Vec<_> = columns.iter().map(|(u, local)| (*u, patch.column(local))).collect();
     for (j, (v, row)) in rows.iter().enumerate() {
         for (i, (u, column)) in columns.iter().enumerate() {
             let uv = [*u, *v];
-            let s = patch.evaluate_at(column, row);
+            let s = column.evaluate(row);
             // The trapezoidal rule: points on a side stand for half a cell.
             let share = |k: usize, n: usize| if k == 0 || k == n { 0.5 } else { 1.0 } / n as f64;
             let area = s.du.cross(s.dv).length() * share(i, cells[0]) * share(j, cells[1]);
@@ -199,10 +200,11 @@ fn nearest_of_all(surface: &SplineSurface, boxes: &[[DVec3; 2]], p: DVec3, found
             inner.chain([1.0]).map(|t| (t, basis.evaluate(t))).collect()
         };
         let (us, vs) = (places(&patch.basis_u), places(&patch.basis_v));
+        let us: Vec<_> = us.iter().map(|(u, local)| (*u, patch.column(local))).collect();
         let nearest = us
             .iter()
             .flat_map(|(u, column)| vs.iter().map(move |(v, row)| ([*u, *v], column, row)))
-            .map(|(uv, column, row)| (patch.evaluate_at(column, row).position.distance_squared(p), uv))
+            .map(|(uv, column, row)| (column.evaluate(row).position.distance_squared(p), uv))
             .min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, start)) = nearest {
             best = best.min(distance(patch, p, start));

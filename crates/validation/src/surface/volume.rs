@@ -71,11 +71,12 @@ pub fn volume_by_quadrature(surface: &SplineSurface) -> f64 {
                 nodes.into_iter().map(|(t, weight)| (basis.evaluate(t), weight)).collect()
             };
             let (u, v) = (nodes(&patch.basis_u), nodes(&patch.basis_v));
+            let u: Vec<_> = u.iter().map(|(u, weight)| (patch.column(u), weight)).collect();
             let mut sum = 0.0;
             for (v, weight_v) in &v {
                 for (u, weight_u) in &u {
-                    let s = patch.evaluate_at(u, v);
-                    sum += weight_u * weight_v * (s.position - center).dot(s.du.cross(s.dv));
+                    let s = u.evaluate(v);
+                    sum += *weight_u * weight_v * (s.position - center).dot(s.du.cross(s.dv));
                 }
             }
             sum
