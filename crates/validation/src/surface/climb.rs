@@ -4,7 +4,8 @@
 //! the bracket was 0.18 % of the diagonal at points as far apart as the mesh's vertices and is 0.24 %.
 
 use topipe_mesh::DVec3;
-use topipe_spline_fit::Patch;
+use topipe_spline_fit::basis::Local;
+use topipe_spline_fit::{Basis, Patch};
 
 /// Steps over the cell of the grid, coarse to fine.
 const STEPS: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
@@ -19,22 +20,27 @@ pub(crate) fn climb(
     cell: [f64; 2],
     mut beyond: impl FnMut(DVec3, f64) -> Option<f64>,
 ) -> (f64, DVec3) {
-    let mut at = |[u, v]: [f64; 2], limit: f64| {
-        let p = patch.evaluate(u, v).position;
-        (beyond(p, limit), p)
-    };
-    let (start, p) = at(place, f64::NEG_INFINITY);
-    let (mut place, mut best) = (place, (start.unwrap_or(f64::NEG_INFINITY), p));
+    let (mut u, mut v) = (Along::new(&patch.basis_u, place[0]), Along::new(&patch.basis_v, place[1]));
+    let p = patch.evaluate_at(&u.local, &v.local).position;
+    let mut best = (beyond(p, f64::NEG_INFINITY).unwrap_or(f64::NEG_INFINITY), p);
+    // Places that were no better than what was best then.
+    let mut denied: Vec<[f64; 2]> = Vec::with_capacity(STEPS.len() * MOVES * 4);
     for step in STEPS {
         for _ in 0..MOVES {
             let mut moved = false;
             for [i, j] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
-                let next =
-                    [place[0] + i * step * cell[0], place[1] + j * step * cell[1]].map(|t| t.clamp(0.0, 1.0));
-                if next != place
-                    && let (Some(found), p) = at(next, best.0)
-                {
-                    (place, best, moved) = (next, (found, p), true);
+                let next = [u.at + i * step * cell[0], v.at + j * step * cell[1]].map(|t| t.clamp(0.0, 1.0));
+                if next == [u.at, v.at] || denied.contains(&next) {
+                    continue;
+                }
+                let (next_u, next_v) = (u.moved(next[0]), v.moved(next[1]));
+                let p = patch.evaluate_at(&next_u.local, &next_v.local).position;
+                match beyond(p, best.0) {
+                    Some(found) => {
+                        denied.push([u.at, v.at]);
+                        (u, v, best, moved) = (next_u, next_v, (found, p), true);
+                    }
+                    None => denied.push(next),
                 }
             }
             if !moved {
@@ -45,10 +51,29 @@ pub(crate) fn climb(
     best
 }
 
+/// A parameter and the functions of a basis there.
+#[derive(Clone, Copy)]
+struct Along<'a> {
+    basis: &'a Basis,
+    at: f64,
+    local: Local,
+}
+
+impl<'a> Along<'a> {
+    fn new(basis: &'a Basis, at: f64) -> Self {
+        Self { basis, at, local: basis.evaluate(at) }
+    }
+
+    /// Half of all steps leave it where it is.
+    fn moved(&self, at: f64) -> Self {
+        if at == self.at { *self } else { Self::new(self.basis, at) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use topipe_spline_fit::{Basis, PatchSide};
+    use topipe_spline_fit::PatchSide;
 
     fn beyond(distance: impl Fn(DVec3) -> f64) -> impl FnMut(DVec3, f64) -> Option<f64> {
         move |p, limit| Some(distance(p)).filter(|d| *d > limit)
