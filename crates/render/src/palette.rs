@@ -20,20 +20,35 @@ fn tile_colors() -> [Color; 12] {
 pub fn categorical(mesh: &TriangleMesh, id_of_face: &[u32]) -> Vec<Color> {
     let colors = tile_colors();
     let count = id_of_face.iter().filter(|&&id| id != u32::MAX).max().map_or(0, |&id| id as usize + 1);
-    let mut sides: Vec<([u32; 2], u32)> = Vec::with_capacity(mesh.face_count() * 3);
-    for (triangle, &id) in mesh.triangles.iter().zip(id_of_face) {
-        for k in 0..3 {
-            let (a, b) = (triangle[k].0, triangle[(k + 1) % 3].0);
-            sides.push(([a.min(b), a.max(b)], id));
-        }
+    // Sides by their lower vertex: few for each, which are sorted in no time.
+    let vertices = mesh.triangles.iter().flatten().map(|v| v.index() + 1).max().unwrap_or(0);
+    let mut first = vec![0usize; vertices + 1];
+    let sides = || {
+        mesh.triangles.iter().zip(id_of_face).flat_map(|(triangle, &id)| {
+            (0..3).map(move |k| {
+                let (a, b) = (triangle[k].0, triangle[(k + 1) % 3].0);
+                (a.min(b) as usize, (a.max(b), id))
+            })
+        })
+    };
+    sides().for_each(|(low, _)| first[low + 1] += 1);
+    (1..first.len()).for_each(|v| first[v] += first[v - 1]);
+    let mut at_vertex = vec![(0, 0); first[vertices]];
+    let mut next = first.clone();
+    for (low, side) in sides() {
+        at_vertex[next[low]] = side;
+        next[low] += 1;
     }
-    sides.sort_unstable();
     let mut neighbors = vec![BTreeSet::new(); count];
-    for pair in sides.windows(2) {
-        let (a, b) = (pair[0].1, pair[1].1);
-        if pair[0].0 == pair[1].0 && a != b && a != u32::MAX && b != u32::MAX {
-            neighbors[a as usize].insert(b as usize);
-            neighbors[b as usize].insert(a as usize);
+    for ends in first.windows(2) {
+        let around = &mut at_vertex[ends[0]..ends[1]];
+        around.sort_unstable();
+        for pair in around.windows(2) {
+            let (a, b) = (pair[0].1, pair[1].1);
+            if pair[0].0 == pair[1].0 && a != b && a != u32::MAX && b != u32::MAX {
+                neighbors[a as usize].insert(b as usize);
+                neighbors[b as usize].insert(a as usize);
+            }
         }
     }
     let mut chosen = vec![usize::MAX; count];
