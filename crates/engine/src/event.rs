@@ -1,5 +1,6 @@
 //! What happens during a run, in the order in which it happens.
 
+use crate::artifact::Value;
 use crate::cache::Damage;
 use crate::error::ExitCode;
 use crate::hash::ContentHash;
@@ -170,6 +171,12 @@ impl Event {
 pub trait EventSink: Send + Sync + 'static {
     /// Takes note of one event.
     fn event(&self, event: &Event);
+
+    /// Is given the result of a stage that was computed in this run, before it is stored: for whoever can begin with it while the
+    /// run goes on. The event that the stage is finished follows, unless it cannot be stored. The run waits for this call.
+    fn result(&self, stage: &str, value: &Value) {
+        let _ = (stage, value);
+    }
 }
 
 impl<F: Fn(&Event) + Send + Sync + 'static> EventSink for F {

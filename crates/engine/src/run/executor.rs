@@ -1,5 +1,6 @@
 //! Stages in parallel, each as soon as what it depends on is there.
 
+use super::ahead::Ahead;
 use super::failure::Failure;
 use super::produce::Settled;
 use super::{Events, FileRecord, InputRecord, Outcome, RunOptions, StageRecord};
@@ -14,6 +15,7 @@ use crate::interrupt::Interrupt;
 use crate::machine;
 use crate::reason::Reason;
 use crate::spec::StageNode;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -43,6 +45,14 @@ struct Schedule {
     front: usize,
     /// Nothing more is begun.
     stopping: bool,
+    /// Exports that a thread without a stage may compose.
+    exports: VecDeque<(usize, Value)>,
+}
+
+/// What a thread does next.
+enum Task {
+    Stage(usize),
+    Export(usize, Value),
 }
 
 pub(super) struct Executor<'a> {
@@ -54,6 +64,8 @@ pub(super) struct Executor<'a> {
     pub(super) slots: Vec<Mutex<Slot>>,
     /// Results in memory, so that the next stage need not decode them. The lock is held while one is fetched.
     pub(super) values: Vec<Mutex<Option<Value>>>,
+    /// Exports that wait to be written.
+    pub(super) ahead: Ahead,
     schedule: Mutex<Schedule>,
     wake: Condvar,
 }
@@ -80,11 +92,13 @@ impl<'a> Executor<'a> {
             order,
             slots: (0..count).map(|_| Mutex::default()).collect(),
             values: (0..count).map(|_| Mutex::default()).collect(),
+            ahead: Ahead::new(decider.pipeline.exports.len()),
             schedule: Mutex::new(Schedule {
                 status: vec![Status::Waiting; count],
                 running: 0,
                 front: 0,
                 stopping: false,
+                exports: VecDeque::new(),
             }),
             wake: Condvar::new(),
         }
@@ -119,16 +133,28 @@ impl<'a> Executor<'a> {
 
     fn work(&self) {
         loop {
-            let stage = {
+            let task = {
                 let mut schedule = lock(&self.schedule);
                 loop {
                     if let Some(stage) = self.next(&mut schedule) {
-                        break stage;
+                        break Task::Stage(stage);
                     }
                     if schedule.running == 0 {
                         return;
                     }
+                    if !self.interrupt.is_raised()
+                        && let Some((export, value)) = schedule.exports.pop_front()
+                    {
+                        break Task::Export(export, value);
+                    }
                     schedule = self.wake.wait(schedule).unwrap_or_else(PoisonError::into_inner);
+                }
+            };
+            let stage = match task {
+                Task::Stage(stage) => stage,
+                Task::Export(export, value) => {
+                    self.compose_ahead(export, value);
+                    continue;
                 }
             };
             let good = self.attend(stage);
@@ -138,6 +164,18 @@ impl<'a> Executor<'a> {
             schedule.stopping |= !good && !self.options.keep_going;
             self.wake.notify_all();
         }
+    }
+
+    /// A stage has come to a result, which is still to be stored: what can be done with it meanwhile, and while later stages run.
+    pub(super) fn begin_ahead(&self, stage: usize, value: &Value) {
+        self.events.result(&self.node(stage).name, value);
+        // A thread that runs one stage after the other has no time for more.
+        if self.options.jobs < 2 {
+            return;
+        }
+        let exports = self.exports_ahead(stage).into_iter().map(|export| (export, Arc::clone(value)));
+        lock(&self.schedule).exports.extend(exports);
+        self.wake.notify_all();
     }
 
     /// The first stage that can begin. Stages that never can are marked on the way.

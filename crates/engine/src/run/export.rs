@@ -3,6 +3,7 @@
 use super::executor::{Executor, lock};
 use super::failure::Failure;
 use super::{ExportOutcome, ExportRecord};
+use crate::artifact::Value;
 use crate::cache::{Bucket, CacheError, Durability, Temporary};
 use crate::error::ExitCode;
 use crate::event::Event;
@@ -21,6 +22,11 @@ use std::sync::{Mutex, PoisonError};
 /// What was last written into an output folder, by file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Written(BTreeMap<String, WrittenFile>);
+
+/// Whether a run writes an export if its stage has a result.
+pub(super) fn writes_of(executor: &Executor<'_>, export: &ExportNode) -> bool {
+    !export.exporter.after_run && executor.is_selected(export.stage)
+}
 
 /// One file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,10 +71,10 @@ struct Told<'a> {
 
 impl Told<'_> {
     /// Takes what became of export `at`, and tells of all that come before the next unfinished one.
-    fn finish(&mut self, at: usize, done: Done, exports: &[&ExportNode]) {
+    fn finish(&mut self, at: usize, done: Done, exports: &[(usize, &ExportNode)]) {
         self.finished[at] = Some(done);
         while let Some(done) = self.finished.get_mut(self.count).and_then(Option::take) {
-            self.tell(exports[self.count], done);
+            self.tell(exports[self.count].1, done);
             self.count += 1;
         }
     }
@@ -105,8 +111,8 @@ pub(super) fn write_all(executor: &Executor<'_>) -> Vec<ExportRecord> {
     let out = &executor.options.out;
     let name = std::path::absolute(out).unwrap_or_else(|_| out.clone()).to_string_lossy().into_owned();
     let before: Written = executor.cache().read_record(Bucket::Exports, &name).unwrap_or_default();
-    let of_stages = executor.pipeline().exports.iter().filter(|export| !export.exporter.after_run);
-    let exports: Vec<&ExportNode> = of_stages.filter(|export| executor.is_selected(export.stage)).collect();
+    let all = executor.pipeline().exports.iter().enumerate();
+    let exports: Vec<(usize, &ExportNode)> = all.filter(|(_, export)| writes_of(executor, export)).collect();
     let told = Mutex::new(Told {
         executor,
         finished: exports.iter().map(|_| None).collect(),
@@ -118,8 +124,8 @@ pub(super) fn write_all(executor: &Executor<'_>) -> Vec<ExportRecord> {
     let work = || {
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
-            let Some(export) = exports.get(at) else { break };
-            let done = attend(executor, export, &before);
+            let Some(&(place, export)) = exports.get(at) else { break };
+            let done = attend(executor, place, export, &before);
             lock(&told).finish(at, done, &exports);
         }
     };
@@ -141,7 +147,7 @@ pub(super) fn write_all(executor: &Executor<'_>) -> Vec<ExportRecord> {
 }
 
 /// Writes one export, unless nothing needs it.
-fn attend(executor: &Executor<'_>, export: &ExportNode, before: &Written) -> Done {
+fn attend(executor: &Executor<'_>, place: usize, export: &ExportNode, before: &Written) -> Done {
     if executor.interrupt.is_raised() {
         return Done::Interrupted;
     }
@@ -152,7 +158,7 @@ fn attend(executor: &Executor<'_>, export: &ExportNode, before: &Written) -> Don
     {
         return Done::UpToDate(known);
     }
-    Done::Finished(write(executor, export, artifact, &path))
+    Done::Finished(write(executor, place, artifact, &path))
 }
 
 fn record(
@@ -186,61 +192,90 @@ fn is_up_to_date(known: &mut WrittenFile, path: &Path, artifact: ContentHash, ex
 
 fn write(
     executor: &Executor<'_>,
-    export: &ExportNode,
+    place: usize,
     artifact: ContentHash,
     path: &Path,
 ) -> Result<WrittenFile, Failure> {
-    let value = executor.obtain(export.stage)?;
+    let export = &executor.pipeline().exports[place];
     let fail = |error| Failure::from(CacheError::io("write", path, error));
-    let temporary = Temporary::beside(path).map_err(fail)?;
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    // The ending was found without regard to case; its dot comes before it.
-    let title = name.get(..name.len().saturating_sub(export.exporter.ending.len() + 1)).unwrap_or(&name);
-    // Hashed and written in blocks: many hashes at once are several times faster than one small piece after the other.
-    let hashing = HashingFile { file: temporary, hasher: blake3::Hasher::new(), bytes: 0 };
-    let mut file = BufWriter::with_capacity(BLOCK, hashing);
-    let result =
-        std::panic::catch_unwind(AssertUnwindSafe(|| export.exporter.write(&value, title, &mut file)));
-    match result {
-        Ok(Ok(())) => {}
-        Ok(Err(ExportError::Io(error))) => return Err(fail(error)),
-        Ok(Err(error)) => return Err(Failure { message: error.to_string(), code: ExitCode::Refused }),
-        Err(_) => {
-            let message = format!(
-                "the writer of .{} files panicked, which is a defect of topipe",
-                export.exporter.ending
-            );
-            return Err(Failure { message, code: ExitCode::StageFailed });
+    let in_memory = lock(&executor.values[export.stage]).clone();
+    let (temporary, content, bytes) = match executor.ahead.take(place, in_memory.as_ref()) {
+        Some(composed) => {
+            let mut temporary = Temporary::beside(path).map_err(fail)?;
+            composed.pieces.iter().try_for_each(|piece| temporary.write_all(piece)).map_err(fail)?;
+            (temporary, composed.content, composed.bytes)
         }
-    }
-    let HashingFile { file: temporary, hasher, bytes } =
-        file.into_inner().map_err(|error| fail(error.into_error()))?;
-    let content = ContentHash::from_bytes(*hasher.finalize().as_bytes());
+        None => {
+            let value = executor.obtain(export.stage)?;
+            let temporary = Temporary::beside(path).map_err(fail)?;
+            let written = compose(export, &value, temporary).map_err(|unwritten| match unwritten {
+                Unwritten::Io(error) => fail(error),
+                Unwritten::Failed(failure) => failure,
+            })?;
+            let content = ContentHash::from_bytes(*written.hasher.finalize().as_bytes());
+            (written.to, content, written.bytes)
+        }
+    };
     temporary.persist(path, Durability::Flushed).map_err(fail)?;
     crate::failpoint::pass("export written");
     let writer = export.exporter.code_version.clone();
     Ok(WrittenFile { artifact, writer, content, bytes, memo: None })
 }
 
+/// Why an export is not there.
+pub(super) enum Unwritten {
+    /// It could not be written where it should go.
+    Io(std::io::Error),
+    /// It could not be composed.
+    Failed(Failure),
+}
+
+/// Lets the writer of an export write it to `to`.
+pub(super) fn compose<W: Write>(export: &ExportNode, value: &Value, to: W) -> Result<Hashing<W>, Unwritten> {
+    let file = Path::new(&export.file).file_name();
+    let name = file.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    // The ending was found without regard to case; its dot comes before it.
+    let title = name.get(..name.len().saturating_sub(export.exporter.ending.len() + 1)).unwrap_or(&name);
+    // Hashed and written in blocks: many hashes at once are several times faster than one small piece after the other.
+    let hashing = Hashing { to, hasher: blake3::Hasher::new(), bytes: 0 };
+    let mut file = BufWriter::with_capacity(BLOCK, hashing);
+    let result =
+        std::panic::catch_unwind(AssertUnwindSafe(|| export.exporter.write(value, title, &mut file)));
+    match result {
+        Ok(Ok(())) => file.into_inner().map_err(|error| Unwritten::Io(error.into_error())),
+        Ok(Err(ExportError::Io(error))) => Err(Unwritten::Io(error)),
+        Ok(Err(error)) => {
+            Err(Unwritten::Failed(Failure { message: error.to_string(), code: ExitCode::Refused }))
+        }
+        Err(_) => {
+            let message = format!(
+                "the writer of .{} files panicked, which is a defect of topipe",
+                export.exporter.ending
+            );
+            Err(Unwritten::Failed(Failure { message, code: ExitCode::StageFailed }))
+        }
+    }
+}
+
 /// Bytes that are hashed and written together.
 const BLOCK: usize = 1 << 17;
 
-/// Hashes what passes through on its way to the file.
-struct HashingFile<W: Write> {
-    file: W,
-    hasher: blake3::Hasher,
-    bytes: u64,
+/// Hashes what passes through on its way.
+pub(super) struct Hashing<W: Write> {
+    pub(super) to: W,
+    pub(super) hasher: blake3::Hasher,
+    pub(super) bytes: u64,
 }
 
-impl<W: Write> Write for HashingFile<W> {
+impl<W: Write> Write for Hashing<W> {
     fn write(&mut self, buffer: &[u8]) -> std::io::Result<usize> {
-        let length = self.file.write(buffer)?;
+        let length = self.to.write(buffer)?;
         self.hasher.update(&buffer[..length]);
         self.bytes += length as u64;
         Ok(length)
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        self.file.flush()
+        self.to.flush()
     }
 }

@@ -1,5 +1,6 @@
 //! Doing what the plan says.
 
+mod ahead;
 mod executor;
 mod export;
 mod failure;
@@ -11,6 +12,7 @@ pub use record::{
     ExportOutcome, ExportRecord, FileRecord, InputRecord, Machine, Outcome, RunRecord, StageRecord,
 };
 
+use crate::artifact::Value;
 use crate::cache::{Cache, CacheError, Lease};
 use crate::decide::Decider;
 use crate::error::ExitCode;
@@ -65,6 +67,11 @@ impl Events {
         // A sink that panicked has said what it had to say; the run goes on.
         let sink = self.sink.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         sink.event(event);
+    }
+
+    fn result(&self, stage: &str, value: &Value) {
+        let sink = self.sink.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        sink.result(stage, value);
     }
 }
 

@@ -88,6 +88,7 @@ impl Executor<'_> {
             Err(payload) => return Err(panicked(payload.as_ref()).into()),
         };
         let seconds = start.elapsed().as_secs_f64();
+        self.begin_ahead(stage, &value);
         let stored = self.store(stage, key, &value)?;
         let record = KeyRecord {
             key,
