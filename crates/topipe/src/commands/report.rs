@@ -18,6 +18,6 @@ pub(crate) fn run(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
         _ => PathBuf::new(),
     };
     let output = arguments.output.clone().unwrap_or_else(|| folder.join("report.html"));
-    crate::report::write(&record, &Cache::new(cache), &registry(), &output, true)?;
+    crate::report::write(&record, &Cache::new(cache), &registry(), &output, true, None)?;
     super::print(&format!("{}\n", output.display()))
 }

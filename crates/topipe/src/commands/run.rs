@@ -4,6 +4,7 @@ use crate::args::{RunArguments, Verbosity};
 use crate::artifacts::{Report, Stiffness};
 use crate::display::{self, Console, JsonLines};
 use crate::failure::Failure;
+use crate::report::Ahead;
 use crate::stages::registry;
 use std::sync::Arc;
 use std::time::Duration;
@@ -29,6 +30,10 @@ pub(crate) fn run(arguments: &RunArguments, verbosity: Verbosity) -> Result<Exit
     } else {
         Arc::clone(&console) as _
     };
+    // One stage at a time is one thing at a time.
+    let ahead = (options.jobs > 1).then(|| Ahead::new(&pipeline, &cache, &registry, Arc::clone(&sink)));
+    let ahead = ahead.flatten().map(Arc::new);
+    let sink = ahead.as_ref().map_or(sink, |ahead| Arc::clone(ahead) as _);
     let record = run_pipeline(&pipeline, &cache, &options, &interrupt, sink)?;
     console.finish();
     let table = SweepTable::new(&pipeline, &record, &cache, USUAL_FIGURES);
@@ -36,7 +41,10 @@ pub(crate) fn run(arguments: &RunArguments, verbosity: Verbosity) -> Result<Exit
         write_atomically(&options.out.join("sweep.csv"), table.csv().as_bytes())?;
     }
     // What was written stays written, so that a report that cannot be is a failure of its own.
-    let reports = crate::report::write_all(&pipeline, &record, &cache, &registry, &options.out);
+    let reports =
+        crate::report::write_all(&pipeline, &record, &cache, &registry, &options.out, ahead.as_deref());
+    // The process is about to end: giving back its memory piece by piece would only take time.
+    std::mem::forget(ahead);
     if !arguments.json && verbosity > Verbosity::Quiet {
         let (figures, broken) = match table {
             Some(table) => (vec![("sweep.csv".to_owned(), table.text())], None),

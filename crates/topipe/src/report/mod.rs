@@ -4,6 +4,7 @@
 //! it shows has changed; a run that finds all results in the cache leaves it alone, so that the times in it stay those of
 //! the run that took them.
 
+mod ahead;
 mod pictures;
 mod results;
 mod scene;
@@ -11,7 +12,9 @@ mod surface_mesh;
 mod unfinished;
 
 use crate::failure::Failure;
-use results::Results;
+pub(crate) use ahead::Ahead;
+use ahead::Model;
+use results::{Known, Results};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use topipe_engine::cache::{Bucket, write_atomically};
@@ -29,6 +32,7 @@ pub(crate) fn write_all(
     cache: &Cache,
     registry: &Registry,
     out: &Path,
+    ahead: Option<&Ahead>,
 ) -> Result<Vec<(PathBuf, bool)>, Failure> {
     let mut reports = Vec::new();
     for export in pipeline.exports.iter().filter(|export| export.exporter.after_run) {
@@ -51,7 +55,7 @@ pub(crate) fn write_all(
         let path = out.join(&export.file);
         // Who interrupts a run does not want to wait; `topipe report` measures what there is later.
         let measure = record.code != ExitCode::Interrupted;
-        let written = write(&shown, cache, registry, &path, measure)?;
+        let written = write(&shown, cache, registry, &path, measure, ahead)?;
         reports.push((PathBuf::from(&export.file), written));
     }
     Ok(reports)
@@ -68,20 +72,22 @@ fn part_of(record: &RunRecord, variant: &str, names: &[String]) -> RunRecord {
 }
 
 /// Writes the report of a run, unless the file shows the same already. Says whether it was written. With `measure` the
-/// figures of a validation that gave none are measured on what there is, which takes as long as the stage would.
+/// figures of a validation that gave none are measured on what there is, which takes as long as the stage would. What was made
+/// `ahead` of the end of the run is not made again.
 pub(crate) fn write(
     record: &RunRecord,
     cache: &Cache,
     registry: &Registry,
     path: &Path,
     measure: bool,
+    ahead: Option<&Ahead>,
 ) -> Result<bool, Failure> {
     let measure = measure && unfinished::any(&record.stages);
     let key = key(record, cache, measure);
     if is_up_to_date(path, key) {
         return Ok(false);
     }
-    let page = topipe_report::html(&document(record, cache, registry, measure));
+    let page = topipe_report::html(&document(record, cache, registry, measure, ahead));
     // A browser takes a comment before the doctype for none, so it stands behind it.
     let (doctype, rest) = page.split_once('>').unwrap_or((page.as_str(), ""));
     let seal = seal(key, page.len());
@@ -136,12 +142,20 @@ fn key(record: &RunRecord, cache: &Cache, measure: bool) -> ContentHash {
 const UNFINISHED: &str = "The validation gave no report in this run. These figures were measured for this page, on the results there are.";
 
 /// Everything the page shows.
-fn document(record: &RunRecord, cache: &Cache, registry: &Registry, measure: bool) -> Document {
-    let mut results = Results::load(record, cache, registry);
+fn document(
+    record: &RunRecord,
+    cache: &Cache,
+    registry: &Registry,
+    measure: bool,
+    ahead: Option<&Ahead>,
+) -> Document {
+    let (model, known) = ahead.map_or((None, Known::new()), |ahead| ahead.take(&record.stages));
+    let mut results = Results::load(record, cache, registry, &known);
     if measure {
         results.measure_unfinished();
     }
-    let (scene, histograms, left_out) = scene::scene(&results);
+    let Model { scene, pictures, mut histograms, left_out } = model.unwrap_or_else(|| Model::of(&results));
+    histograms.extend(scene::histogram_of_report(&results));
     let mut figures: Vec<Figures> = Vec::new();
     for (stage, report, own) in results.reports() {
         let value = serde_json::from_str(&report.to_json()).unwrap_or_default();
@@ -187,7 +201,7 @@ fn document(record: &RunRecord, cache: &Cache, registry: &Registry, measure: boo
         diagram: crate::diagram::of_record(record),
         figures,
         histograms,
-        pictures: pictures::pictures(&scene),
+        pictures,
         scene,
         missing: results.missing.iter().chain(&left_out).cloned().collect(),
     }

@@ -3,9 +3,14 @@
 use super::unfinished::{self, Measured};
 use crate::artifacts;
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::sync::Arc;
 use topipe_engine::{ArtifactKind, Cache, Registry, RunRecord, StageRecord, Value};
 use topipe_mesh::Part;
 use topipe_validation::Report;
+
+/// Results in memory by the names of their stages.
+pub(super) type Known = HashMap<String, Value>;
 
 /// The results by stage, in the order of the record.
 pub(super) struct Results<'a> {
@@ -18,8 +23,12 @@ pub(super) struct Results<'a> {
 }
 
 impl<'a> Results<'a> {
-    pub(super) fn load(record: &'a RunRecord, cache: &Cache, registry: &Registry) -> Self {
+    /// Those that are `known` are not read.
+    pub(super) fn load(record: &'a RunRecord, cache: &Cache, registry: &Registry, known: &Known) -> Self {
         let load = |stage: &StageRecord| {
+            if let Some(value) = known.get(&stage.stage) {
+                return Some(Arc::clone(value));
+            }
             let artifact = registry.artifact(&stage.artifact_kind)?;
             // Damage is told of by the next run, which needs the result for more than a picture.
             cache.load(&artifact, stage.artifact?, &mut Vec::new()).ok().flatten()
@@ -35,6 +44,12 @@ impl<'a> Results<'a> {
                 format!("The {} of stage {} {why}.", stage.artifact_kind, stage.stage)
             });
         Self { missing: missing.collect(), measured: Vec::new(), record, values }
+    }
+
+    /// The stages whose results are there, with those.
+    pub(super) fn known(&self) -> Known {
+        let all = self.record.stages.iter().zip(&self.values);
+        all.filter_map(|(stage, value)| Some((stage.stage.clone(), value.clone()?))).collect()
     }
 
     /// Measures what there is for validations that gave no report.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::sync::OnceLock;
 use topipe_beams::Structure;
-use topipe_engine::StageRecord;
+use topipe_engine::{ArtifactKind, StageRecord};
 use topipe_mesh::spatial::SurfaceIndex;
 use topipe_mesh::{DVec3, Part, RegionId, RegionShape, TriangleMesh};
 use topipe_quad_matching::QuadLayout;
@@ -85,7 +85,10 @@ impl Room {
     }
 }
 
-/// All layers, and the distributions of what is measured on them.
+/// Kinds of results that no layer shows.
+pub(super) const NOT_SHOWN: [&str; 2] = [artifacts::Report::NAME, artifacts::Stiffness::NAME];
+
+/// All layers, the distributions of what is measured on them, and what is said of results without one.
 pub(super) fn scene(results: &Results<'_>) -> (Scene, Vec<Histogram>, Vec<String>) {
     let stops = |color: &dyn Fn(f64) -> Color| (0..=32).map(|k| color(f64::from(k) / 32.0).0).collect();
     let color_maps = ColorMaps {
@@ -170,15 +173,8 @@ impl Chains {
 
 impl<'a> Builder<'a> {
     /// What adds layers, in the order in which they are listed.
-    const KINDS: [fn(&mut Self); 7] = [
-        Self::surfaces,
-        Self::meshes,
-        Self::tilings,
-        Self::layouts,
-        Self::skeletons,
-        Self::beams,
-        Self::report_histograms,
-    ];
+    const KINDS: [fn(&mut Self); 6] =
+        [Self::surfaces, Self::meshes, Self::tilings, Self::layouts, Self::skeletons, Self::beams];
 
     /// The distances of points from the mesh of a stage.
     fn distances(&self, points: &[DVec3], stage: &StageRecord, part: &Part) -> Vec<f64> {
@@ -395,25 +391,15 @@ impl<'a> Builder<'a> {
             self.scene.lines.push(lines);
         }
     }
+}
 
-    /// What is in the report as counts.
-    fn report_histograms(&mut self) {
-        for (_, report, _) in self.results.reports() {
-            let Some(shape) = report.smoothing.as_ref().and_then(|smoothing| smoothing.shape.as_ref()) else {
-                continue;
-            };
-            let about = "one for each edge of the smoothed mesh: 0 is flat, 180 folded back";
-            let counts: Vec<u64> = shape.after.histogram.iter().map(|&count| count as u64).collect();
-            self.histograms.extend(Histogram::of_counts(
-                "Angles between triangles",
-                about,
-                "degrees",
-                10.0,
-                &counts,
-            ));
-            break;
-        }
-    }
+/// What is in a report as counts.
+pub(super) fn histogram_of_report(results: &Results<'_>) -> Option<Histogram> {
+    let reports = results.reports().into_iter();
+    let shape = reports.filter_map(|(_, report, _)| report.smoothing.as_ref()?.shape.as_ref()).next()?;
+    let about = "one for each edge of the smoothed mesh: 0 is flat, 180 folded back";
+    let counts: Vec<u64> = shape.after.histogram.iter().map(|&count| count as u64).collect();
+    Histogram::of_counts("Angles between triangles", about, "degrees", 10.0, &counts)
 }
 
 /// Groups of faces by what they are, each face a group of its own.
