@@ -4,9 +4,10 @@
 //! mesh is triangulated anew with only those vertices that are to stay and the edges between them that are constrained.
 //! No point of the surface moves, as everything happens inside the flat faces of the original.
 
-use crate::refine::Refiner;
+use crate::refine::{HalfEdges, Refiner};
 use crate::{Connectivity, ConnectivityError, FaceId, HalfEdgeId, Provenance, VertexId};
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// A coarsened refiner, with what is needed to follow it.
@@ -19,6 +20,9 @@ pub struct Coarsened {
     /// Where each vertex has gone; none if it was dropped.
     pub vertex: Vec<VertexId>,
 }
+
+/// Faces of the original that one thread does at least: most are whole, and done in no time.
+const CHUNK: usize = 512;
 
 /// The triangles that a face of the original is made of.
 enum Pieces {
@@ -56,13 +60,17 @@ impl Refiner {
         let mut open: Vec<usize> = (0..parents).collect();
         while !open.is_empty() {
             let mut again = Vec::new();
-            for parent in open {
+            open.retain(|&parent| !matches!(pieces[parent], Some(Pieces::Kept)));
+            let found: Vec<_> = open
+                .par_iter()
+                .with_min_len(CHUNK)
+                .map(|&parent| match &children[parent][..] {
+                    [_] => None,
+                    own => self.retriangulate(own, &keep, constrained, labels),
+                })
+                .collect();
+            for (&parent, made) in open.iter().zip(found) {
                 let own = &children[parent];
-                if let Some(Pieces::Kept) = pieces[parent] {
-                    continue;
-                }
-                let made =
-                    if own.len() == 1 { None } else { self.retriangulate(own, &keep, constrained, labels) };
                 pieces[parent] = Some(match made {
                     Some(triangles) => Pieces::New(triangles),
                     None => {
@@ -134,14 +142,9 @@ impl Refiner {
             }
         }
         let connectivity = Connectivity::build(&part.mesh)?;
-        let twin = (0..part.mesh.face_count() * 3).map(|h| connectivity.twin(HalfEdgeId::new(h))).collect();
-        let outgoing = part
-            .mesh
-            .vertices()
-            .map(|v| connectivity.outgoing(v).next().unwrap_or(HalfEdgeId::NONE))
-            .collect();
+        let half_edges = HalfEdges::new(&part.mesh, &connectivity);
         let parent_triangles = self.parent_triangles;
-        let refiner = Self { part, twin, outgoing, parent_face, parent_triangles, features };
+        let refiner = Self { part, half_edges, parent_face, parent_triangles, features };
         Ok(Coarsened { refiner, labels: new_labels, vertex })
     }
 

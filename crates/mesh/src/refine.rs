@@ -3,30 +3,20 @@
 //! A [`Refiner`] owns a part while edges and faces are split. Faces never disappear: a split face keeps its id for
 //! one of its pieces and the others are appended, so arrays that run beside the faces only have to grow.
 
+pub use crate::half_edges::{HalfEdges, Split};
 use crate::{
     Connectivity, ConnectivityError, FaceId, FeatureEdge, FeatureKind, HalfEdgeId, Part, Provenance, VertexId,
 };
-use glam::DVec3;
 use rustc_hash::FxHashMap;
 
 /// A part under refinement. Provenance and parent faces refer to the part it was made from.
 #[derive(Debug, Clone)]
 pub struct Refiner {
     pub(crate) part: Part,
-    pub(crate) twin: Vec<HalfEdgeId>,
-    pub(crate) outgoing: Vec<HalfEdgeId>,
+    pub(crate) half_edges: HalfEdges,
     pub(crate) parent_face: Vec<FaceId>,
     pub(crate) parent_triangles: Vec<[VertexId; 3]>,
     pub(crate) features: FxHashMap<[VertexId; 2], FeatureKind>,
-}
-
-/// What a split made: the new vertex, and each new face with the face it was cut from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Split {
-    /// The new vertex.
-    pub vertex: VertexId,
-    /// Pairs (new face, face that was cut); two for an interior edge or a face, one on a border.
-    pub pieces: Vec<(FaceId, FaceId)>,
 }
 
 fn key(a: VertexId, b: VertexId) -> [VertexId; 2] {
@@ -41,16 +31,11 @@ impl Refiner {
         let connectivity = Connectivity::build(&part.mesh)?;
         let mut part = part.clone();
         part.provenance = part.mesh.vertices().map(Provenance::Vertex).collect();
-        let twin = (0..part.mesh.face_count() * 3).map(|h| connectivity.twin(HalfEdgeId::new(h))).collect();
-        let outgoing = part
-            .mesh
-            .vertices()
-            .map(|v| connectivity.outgoing(v).next().unwrap_or(HalfEdgeId::NONE))
-            .collect();
+        let half_edges = HalfEdges::new(&part.mesh, &connectivity);
         let features = part.feature_edges.iter().map(|e| (e.vertices, e.kind)).collect();
         let parent_triangles = part.mesh.triangles.clone();
         let parent_face = part.mesh.faces().collect();
-        Ok(Self { part, twin, outgoing, parent_face, parent_triangles, features })
+        Ok(Self { part, half_edges, parent_face, parent_triangles, features })
     }
 
     /// The part as it is now; its `feature_edges` are only brought up to date by [`Self::finish`].
@@ -61,7 +46,7 @@ impl Refiner {
     /// The half-edge on the other side, or none on the border.
     #[inline]
     pub fn twin(&self, half_edge: HalfEdgeId) -> HalfEdgeId {
-        self.twin[half_edge.index()]
+        self.half_edges.twin(half_edge)
     }
 
     /// The vertex a half-edge starts from.
@@ -86,18 +71,7 @@ impl Refiner {
     /// The same, one after the other.
     #[inline]
     pub fn around(&self, vertex: VertexId) -> impl Iterator<Item = HalfEdgeId> + '_ {
-        let first = self.outgoing[vertex.index()];
-        let mut next = first;
-        std::iter::from_fn(move || {
-            let h = next;
-            if h.is_some() {
-                next = self.twin(h.prev());
-                if next == first {
-                    next = HalfEdgeId::NONE;
-                }
-            }
-            h.is_some().then_some(h)
-        })
+        self.half_edges.around(vertex)
     }
 
     /// The half-edge from `a` to `b`, if there is one with a face on its left.
@@ -159,31 +133,17 @@ impl Refiner {
         Provenance::Face { face: parent, weights: [w[1], w[2]] }
     }
 
-    fn push_vertex(&mut self, position: DVec3, frozen: bool, provenance: Provenance) -> VertexId {
-        let vertex = VertexId::new(self.part.mesh.positions.len());
-        self.part.mesh.positions.push(position);
+    fn push_vertex(&mut self, frozen: bool, provenance: Provenance) {
         self.part.frozen.push(frozen);
         self.part.provenance.push(provenance);
-        self.outgoing.push(HalfEdgeId::NONE);
-        vertex
     }
 
-    fn push_face(&mut self, corners: [VertexId; 3], from: FaceId) -> FaceId {
-        let face = FaceId::new(self.part.mesh.triangles.len());
-        self.part.mesh.triangles.push(corners);
-        self.part.design.push(self.part.design[from.index()]);
-        self.part.region_of_face.push(self.part.region_of_face[from.index()]);
-        self.parent_face.push(self.parent_face[from.index()]);
-        self.twin.extend([HalfEdgeId::NONE; 3]);
-        face
-    }
-
-    fn pair(&mut self, g: HalfEdgeId, h: HalfEdgeId) {
-        if g.is_some() {
-            self.twin[g.index()] = h;
-        }
-        if h.is_some() {
-            self.twin[h.index()] = g;
+    /// What belongs to the new faces beside their corners.
+    fn push_faces(&mut self, split: &Split) {
+        for &(_, from) in split.pieces() {
+            self.part.design.push(self.part.design[from.index()]);
+            self.part.region_of_face.push(self.part.region_of_face[from.index()]);
+            self.parent_face.push(self.parent_face[from.index()]);
         }
     }
 
@@ -191,76 +151,32 @@ impl Refiner {
     ///
     /// A split feature edge becomes two; a point between two frozen vertices is frozen.
     pub fn split_edge(&mut self, half_edge: HalfEdgeId, t: f64) -> Split {
-        let (h, g) = (half_edge, self.twin(half_edge));
-        let (a, b, c) = (self.origin(h), self.target(h), self.origin(h.prev()));
-        let (f, k) = (h.face(), h.corner());
+        let (a, b) = (self.origin(half_edge), self.target(half_edge));
         let position = self.part.mesh.position(a).lerp(self.part.mesh.position(b), t);
         let frozen = self.part.frozen[a.index()] && self.part.frozen[b.index()];
-        let provenance = self.provenance(self.parent_face[f.index()], &[(a, 1.0 - t), (b, t)]);
-        let m = self.push_vertex(position, frozen, provenance);
+        let parent = self.parent_face[half_edge.face().index()];
+        self.push_vertex(frozen, self.provenance(parent, &[(a, 1.0 - t), (b, t)]));
+        let split = self.half_edges.split_edge(&mut self.part.mesh, half_edge, position);
+        let m = split.vertex;
         if let Some(kind) = self.features.remove(&key(a, b)) {
             self.features.insert(key(a, m), kind);
             self.features.insert(key(m, b), kind);
         }
-
-        // (a, b, c) becomes (a, m, c) and (m, b, c).
-        let beyond = self.twin(h.next());
-        self.part.mesh.triangles[f.index()][(k + 1) % 3] = m;
-        let f2 = self.push_face([m, b, c], f);
-        self.pair(HalfEdgeId::of(f2, 1), beyond);
-        self.pair(HalfEdgeId::of(f2, 2), h.next());
-        if self.outgoing[b.index()] == h.next() {
-            self.outgoing[b.index()] = HalfEdgeId::of(f2, 1);
-        }
-        self.outgoing[m.index()] = HalfEdgeId::of(f2, 0);
-        let mut pieces = vec![(f2, f)];
-        if g.is_some() {
-            // (b, a, d) becomes (b, m, d) and (m, a, d).
-            let d = self.origin(g.prev());
-            let (e, l) = (g.face(), g.corner());
-            let beyond = self.twin(g.next());
-            self.part.mesh.triangles[e.index()][(l + 1) % 3] = m;
-            let e2 = self.push_face([m, a, d], e);
-            self.pair(HalfEdgeId::of(e2, 1), beyond);
-            self.pair(HalfEdgeId::of(e2, 2), g.next());
-            if self.outgoing[a.index()] == g.next() {
-                self.outgoing[a.index()] = HalfEdgeId::of(e2, 1);
-            }
-            self.pair(h, HalfEdgeId::of(e2, 0));
-            self.pair(HalfEdgeId::of(f2, 0), g);
-            pieces.push((e2, e));
-        }
-        Split { vertex: m, pieces }
+        self.push_faces(&split);
+        split
     }
 
     /// Splits `face` into three at the point with the given weights of its corners.
     pub fn split_face(&mut self, face: FaceId, weights: [f64; 3]) -> Split {
-        let [a, b, c] = self.part.mesh.triangles[face.index()];
-        let corners = self.part.mesh.corners(face);
-        let position = (0..3).map(|k| weights[k] * corners[k]).sum();
-        let frozen = [a, b, c].iter().all(|v| self.part.frozen[v.index()]);
-        let blend = [(a, weights[0]), (b, weights[1]), (c, weights[2])];
-        let provenance = self.provenance(self.parent_face[face.index()], &blend);
-        let m = self.push_vertex(position, frozen, provenance);
-        let [h0, h1, h2] = [0, 1, 2].map(|k| HalfEdgeId::of(face, k));
-        let (beyond1, beyond2) = (self.twin(h1), self.twin(h2));
-        self.part.mesh.triangles[face.index()][2] = m;
-        let f1 = self.push_face([b, c, m], face);
-        let f2 = self.push_face([c, a, m], face);
-        self.pair(HalfEdgeId::of(f1, 0), beyond1);
-        self.pair(HalfEdgeId::of(f2, 0), beyond2);
-        self.pair(h1, HalfEdgeId::of(f1, 2));
-        self.pair(HalfEdgeId::of(f1, 1), HalfEdgeId::of(f2, 2));
-        self.pair(HalfEdgeId::of(f2, 1), h2);
-        if self.outgoing[b.index()] == h1 {
-            self.outgoing[b.index()] = HalfEdgeId::of(f1, 0);
-        }
-        if self.outgoing[c.index()] == h2 {
-            self.outgoing[c.index()] = HalfEdgeId::of(f2, 0);
-        }
-        self.outgoing[m.index()] = h2;
-        debug_assert_eq!(self.origin(h0), a);
-        Split { vertex: m, pieces: vec![(f1, face), (f2, face)] }
+        let corners = self.part.mesh.triangles[face.index()];
+        let points = self.part.mesh.corners(face);
+        let position = (0..3).map(|k| weights[k] * points[k]).sum();
+        let frozen = corners.iter().all(|v| self.part.frozen[v.index()]);
+        let blend = [0, 1, 2].map(|k| (corners[k], weights[k]));
+        self.push_vertex(frozen, self.provenance(self.parent_face[face.index()], &blend));
+        let split = self.half_edges.split_face(&mut self.part.mesh, face, position);
+        self.push_faces(&split);
+        split
     }
 
     /// Takes back the last split, which was that of the edge of `half_edge` towards `target`. The refiner is as it was
@@ -268,70 +184,29 @@ impl Refiner {
     ///
     /// Only for the very last split that has not been taken back; anything else breaks the connectivity.
     pub fn undo_split_edge(&mut self, half_edge: HalfEdgeId, target: VertexId) {
-        let (h, a, b) = (half_edge, self.origin(half_edge), target);
-        let m = VertexId::new(self.part.mesh.positions.len() - 1);
-        debug_assert_eq!(self.target(h), m);
-        let last = FaceId::new(self.part.mesh.triangles.len() - 1);
-        let on_border = !self.twin(h).is_some();
-        let f2 = if on_border { last } else { FaceId(last.0 - 1) };
-        let g = self.twin(HalfEdgeId::of(f2, 0));
+        let (a, m) = (self.origin(half_edge), self.target(half_edge));
         if let Some(kind) = self.features.remove(&key(a, m)) {
-            self.features.remove(&key(m, b));
-            self.features.insert(key(a, b), kind);
+            self.features.remove(&key(m, target));
+            self.features.insert(key(a, target), kind);
         }
-        self.part.mesh.triangles[h.face().index()][(h.corner() + 1) % 3] = b;
-        self.pair(h.next(), self.twin(HalfEdgeId::of(f2, 1)));
-        if self.outgoing[b.index()] == HalfEdgeId::of(f2, 1) {
-            self.outgoing[b.index()] = h.next();
-        }
-        self.pair(h, g);
-        if !on_border {
-            self.part.mesh.triangles[g.face().index()][(g.corner() + 1) % 3] = a;
-            self.pair(g.next(), self.twin(HalfEdgeId::of(last, 1)));
-            if self.outgoing[a.index()] == HalfEdgeId::of(last, 1) {
-                self.outgoing[a.index()] = g.next();
-            }
-            self.pop_face();
-        } else {
-            self.twin[h.index()] = HalfEdgeId::NONE;
-        }
-        self.pop_face();
-        self.pop_vertex();
+        let gone = self.half_edges.undo_split_edge(&mut self.part.mesh, half_edge, target);
+        self.pop(gone);
     }
 
     /// Takes back the last split, which was that of `face`; see [`Self::undo_split_edge`].
     pub fn undo_split_face(&mut self, face: FaceId) {
-        let faces = self.part.mesh.triangles.len();
-        let (f1, f2) = (FaceId::new(faces - 2), FaceId::new(faces - 1));
-        let [b, c, _] = self.part.mesh.triangles[f1.index()];
-        let [h1, h2] = [1, 2].map(|k| HalfEdgeId::of(face, k));
-        self.part.mesh.triangles[face.index()][2] = c;
-        self.pair(h1, self.twin(HalfEdgeId::of(f1, 0)));
-        self.pair(h2, self.twin(HalfEdgeId::of(f2, 0)));
-        if self.outgoing[b.index()] == HalfEdgeId::of(f1, 0) {
-            self.outgoing[b.index()] = h1;
-        }
-        if self.outgoing[c.index()] == HalfEdgeId::of(f2, 0) {
-            self.outgoing[c.index()] = h2;
-        }
-        self.pop_face();
-        self.pop_face();
-        self.pop_vertex();
+        self.half_edges.undo_split_face(&mut self.part.mesh, face);
+        self.pop(2);
     }
 
-    fn pop_face(&mut self) {
-        self.part.mesh.triangles.pop();
-        self.part.design.pop();
-        self.part.region_of_face.pop();
-        self.parent_face.pop();
-        self.twin.truncate(self.twin.len() - 3);
-    }
-
-    fn pop_vertex(&mut self) {
-        self.part.mesh.positions.pop();
+    /// Drops what belonged to the last vertex and the last faces.
+    fn pop(&mut self, faces: usize) {
+        let left = self.parent_face.len() - faces;
+        self.part.design.truncate(left);
+        self.part.region_of_face.truncate(left);
+        self.parent_face.truncate(left);
         self.part.frozen.pop();
         self.part.provenance.pop();
-        self.outgoing.pop();
     }
 
     /// The face of the original part that `face` is a piece of.
@@ -386,7 +261,7 @@ mod tests {
     fn connectivity_stays_that_of_the_triangles() {
         let refiner = refined();
         let fresh = Connectivity::build(&refiner.part().mesh).unwrap();
-        for h in (0..refiner.twin.len()).map(HalfEdgeId::new) {
+        for h in (0..3 * refiner.part.mesh.face_count()).map(HalfEdgeId::new) {
             assert_eq!(refiner.twin(h), fresh.twin(h));
         }
         for v in refiner.part().mesh.vertices() {
@@ -424,8 +299,7 @@ mod tests {
             }
         }
         assert_eq!(refiner.part, before.part);
-        assert_eq!(refiner.twin, before.twin);
-        assert_eq!(refiner.outgoing, before.outgoing);
+        assert_eq!(refiner.half_edges, before.half_edges);
         assert_eq!(refiner.parent_face, before.parent_face);
         assert_eq!(refiner.features, before.features);
     }

@@ -67,7 +67,7 @@ impl Tiled {
             log.push(Step::Edge(h, self.refiner.target(h)));
         }
         let split = self.refiner.split_edge(h, t);
-        for (_, from) in &split.pieces {
+        for (_, from) in split.pieces() {
             self.tile_of_face.push(self.tile_of_face[from.index()]);
         }
         split.vertex
@@ -78,7 +78,7 @@ impl Tiled {
             log.push(Step::Face(face));
         }
         let split = self.refiner.split_face(face, weights);
-        for (_, from) in &split.pieces {
+        for (_, from) in split.pieces() {
             self.tile_of_face.push(self.tile_of_face[from.index()]);
         }
         split.vertex

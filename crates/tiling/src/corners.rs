@@ -142,7 +142,7 @@ fn split_star(
         let Some(h) = refiner.half_edge(vertex, neighbor) else { return false };
         let split = refiner.split_edge(h, 0.5);
         growth.follow(refiner, &split);
-        for &(_, from) in &split.pieces {
+        for &(_, from) in split.pieces() {
             let inherited = protected[from.index()];
             protected.push(inherited);
         }

@@ -121,7 +121,7 @@ impl Growth {
     /// Follows a split: pieces belong to the tile of the face they were cut from.
     pub(crate) fn follow(&mut self, refiner: &Refiner, split: &Split) {
         let mesh = &refiner.part().mesh;
-        for &(piece, from) in &split.pieces {
+        for &(piece, from) in split.pieces() {
             debug_assert_eq!(piece.index(), self.owner.len());
             self.owner.push(self.owner[from.index()]);
             self.distance.push(self.distance[from.index()]);

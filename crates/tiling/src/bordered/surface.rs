@@ -109,10 +109,10 @@ impl Surface {
     pub(crate) fn split_edge(&mut self, h: HalfEdgeId, t: f64) -> VertexId {
         let twin = self.refiner.twin(h);
         let split = self.refiner.split_edge(h, t);
-        self.follow(&split.pieces);
+        self.follow(split.pieces());
         self.on_barrier.push(self.side[h.index()] != NONE);
         // (a, b, c) has become (a, m, c) and (m, b, c), the other side likewise.
-        for (&(piece, _), g) in split.pieces.iter().zip([h, twin]) {
+        for (&(piece, _), g) in split.pieces().iter().zip([h, twin]) {
             self.side[HalfEdgeId::of(piece, 0).index()] = self.side[g.index()];
             self.side[HalfEdgeId::of(piece, 1).index()] = self.side[g.next().index()];
             self.side[g.next().index()] = NONE;
@@ -125,9 +125,9 @@ impl Surface {
     pub(crate) fn split_face(&mut self, face: FaceId) -> VertexId {
         let old = [0, 1, 2].map(|k| self.side[HalfEdgeId::of(face, k).index()]);
         let split = self.refiner.split_face(face, [1.0 / 3.0; 3]);
-        self.follow(&split.pieces);
+        self.follow(split.pieces());
         self.on_barrier.push(false);
-        for (k, f) in [(1, split.pieces[0].0), (2, split.pieces[1].0)] {
+        for (k, f) in [(1, split.pieces()[0].0), (2, split.pieces()[1].0)] {
             self.side[HalfEdgeId::of(f, 0).index()] = old[k];
             self.side[HalfEdgeId::of(face, k).index()] = NONE;
         }
