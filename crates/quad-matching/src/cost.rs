@@ -1,7 +1,5 @@
 //! What corners and quads cost while the layout is relaxed: dimensionless, 0 for what needs no change.
 
-use crate::Side;
-use crate::refine::Regions;
 use std::f64::consts::FRAC_PI_2;
 
 /// Corners this far from a right angle, radians, cost nothing.
@@ -22,27 +20,15 @@ const TAPER: f64 = 4.0;
 
 /// What it costs that sides of a quad are much shorter than those opposite to them: it is a triangle nearly, and its parameter
 /// lines crowd at the short side. Angles do not show it.
-pub(crate) fn taper(regions: &Regions, r: usize) -> f64 {
-    let sides = &regions.sides[r];
-    if sides.len() != 4 {
-        return 0.0;
-    }
-    let mesh = &regions.tiled.refiner.part().mesh;
-    let length = |side: Side| -> f64 {
-        let path = &regions.edges[side.edge as usize].path;
-        path.windows(2).map(|w| mesh.position(w[0]).distance(mesh.position(w[1]))).sum()
-    };
+/// The lengths are those of its four sides, in order.
+pub(crate) fn taper([a, b, c, d]: [f64; 4]) -> f64 {
     let pair = |a: f64, b: f64| ((a.max(b) / a.min(b)).ln() - TAPER.ln()).clamp(0.0, 10.0).powi(2);
-    pair(length(sides[0]), length(sides[2])) + pair(length(sides[1]), length(sides[3]))
+    pair(a, c) + pair(b, d)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::MacroEdge;
-    use crate::sides::Tiled;
-    use topipe_mesh::refine::Refiner;
-    use topipe_mesh::{Part, TriangleMesh, VertexId};
 
     #[test]
     fn corners_cost_more_the_farther_they_are_from_square() {
@@ -55,25 +41,11 @@ mod tests {
         assert!(of(12.0) > 10.0 * of(45.0));
     }
 
-    /// A trapezoid of the given widths below and above, `height` high, as one region.
-    fn trapezoid(below: f64, above: f64, height: f64) -> Regions {
-        let points = [[0.0, 0.0], [below, 0.0], [above, height], [0.0, height]];
-        let mesh =
-            TriangleMesh::from_arrays(points.map(|[x, y]| [x, y, 0.0]).to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
-        let ends = [[0, 1], [1, 2], [2, 3], [3, 0]];
-        Regions {
-            tiled: Tiled::over(Refiner::new(&Part::new(mesh)).unwrap(), vec![0, 0]),
-            vertices: (0..4).map(VertexId).collect(),
-            edges: ends
-                .map(|ends| MacroEdge { ends, path: ends.map(VertexId).to_vec(), feature: None })
-                .to_vec(),
-            sides: vec![(0..4).map(|edge| Side { edge, reversed: false }).collect()],
-        }
-    }
-
     #[test]
     fn only_a_side_much_shorter_than_its_opposite_costs() {
-        let of = |below, above, height| taper(&trapezoid(below, above, height), 0);
+        // A trapezoid of the given widths below and above, upright on the left.
+        let of =
+            |below: f64, above: f64, height: f64| taper([below, height.hypot(below - above), above, height]);
         assert_eq!(of(1.0, 1.0, 1.0), 0.0);
         // Long quads are not tapered, nor are moderate ones.
         assert_eq!(of(1.0, 1.0, 20.0), 0.0);

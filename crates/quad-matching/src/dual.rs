@@ -9,7 +9,6 @@ use crate::straighten::straighten;
 use crate::{MacroEdge, Pairing, Parameters, QuadLayout, QuadMatchingError, Side};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};
-use topipe_mesh::disk_map::Numbers;
 use topipe_mesh::{FaceId, HalfEdgeId, Part, VertexId};
 use topipe_progress::Progress;
 use topipe_tiling::Tiling;
@@ -218,20 +217,17 @@ fn cut_macro_edges(
             SpokeTask { tile, border, targets, faces, anchor }
         })
         .collect();
-    // Each map depends on its own tile alone, and cutting one tile leaves the faces of the others as they are.
+    // Cutting one tile leaves the faces of the others as they are.
     let shared = &*tiled;
-    let maps: Vec<_> = tasks
-        .par_iter()
-        .map_init(Numbers::default, |numbers, task| spokes::map(shared, task, numbers))
-        .collect();
+    let cut: Vec<_> = tasks.par_iter().map(|task| spokes::cut(shared, task, parameters.snap)).collect();
     let mut sites = Vec::with_capacity(tasks.len());
     let mut halves: BTreeMap<[u32; 2], [Vec<VertexId>; 2]> = BTreeMap::new();
-    for (task, map) in tasks.iter().zip(maps) {
+    for (task, cut) in tasks.iter().zip(cut) {
         if task.tile % 64 == 0 {
             progress.check()?;
             progress.step(task.tile.into(), tasks.len() as u64, "tiles");
         }
-        let (site, paths) = spokes::cut(tiled, task, map, parameters.snap)?;
+        let (site, paths) = cut?.replay(tiled);
         sites.push(site);
         for (side, path) in sides[task.tile as usize].iter().zip(paths) {
             let pair = [task.tile.min(side.neighbor), task.tile.max(side.neighbor)];

@@ -17,6 +17,7 @@
 //! validation, and refused above `max_corner_angle` where that is set.
 
 mod cost;
+mod disk;
 mod doublets;
 mod dual;
 mod ends;

@@ -9,7 +9,6 @@ use crate::spokes::{self, SpokeTask};
 use crate::{MacroEdge, QuadMatchingError, Side};
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
-use topipe_mesh::disk_map::Numbers;
 use topipe_mesh::refine::Refiner;
 use topipe_mesh::{FaceId, HalfEdgeId, Provenance, VertexId};
 use topipe_progress::Progress;
@@ -152,19 +151,18 @@ pub(crate) fn refine(regions: Regions, snap: f64, progress: &Progress) -> Result
             SpokeTask { tile: region as u32, border, targets, faces, anchor: None }
         })
         .collect();
+    progress.check()?;
+    // Cutting one region leaves the faces of the others as they are.
     let shared = &tiled;
-    let maps: Vec<_> = tasks
-        .par_iter()
-        .map_init(Numbers::default, |numbers, task| spokes::map(shared, task, numbers))
-        .collect();
+    let cut: Vec<_> = tasks.par_iter().map(|task| spokes::cut(shared, task, snap)).collect();
     let mut spokes_of = Vec::with_capacity(tasks.len());
     let mut spoke_edges = Vec::new();
-    for (task, map) in tasks.iter().zip(maps) {
+    for (task, cut) in tasks.iter().zip(cut) {
         if task.tile % 64 == 0 {
             progress.check()?;
             progress.step(task.tile.into(), tasks.len() as u64, "regions");
         }
-        let (center, paths) = spokes::cut(&mut tiled, task, map, snap)?;
+        let (center, paths) = cut?.replay(&mut tiled);
         let number = vertices.len() as u32;
         vertices.push(center);
         spokes_of.push((fine.len() + spoke_edges.len()) as u32);

@@ -7,13 +7,14 @@
 //! them is mapped for itself.
 
 use crate::QuadMatchingError;
+use crate::disk::{Cuts, Disk, Numbers};
 use crate::sides::Tiled;
 use glam::DVec2;
 use rustc_hash::{FxHashMap, FxHashSet};
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
-use topipe_mesh::disk_map::{DiskMap, Numbers};
-use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
+use topipe_mesh::disk_map::DiskMap;
+use topipe_mesh::{FaceId, HalfEdgeId, TriangleMesh, VertexId};
 
 /// A tile with its border and the spokes that are already fixed.
 pub(crate) struct SpokeTask {
@@ -28,9 +29,31 @@ pub(crate) struct SpokeTask {
     pub(crate) anchor: Option<VertexId>,
 }
 
-/// Plane coordinates of the tile's vertices; computed for many tiles at once, before any of them is cut.
-pub(crate) fn map(tiled: &Tiled, task: &SpokeTask, numbers: &mut Numbers) -> Option<DiskMap> {
-    let mesh = &tiled.refiner.part().mesh;
+impl SpokeTask {
+    /// The same in the numbers of a disk; none where something does not belong to it.
+    fn within(&self, numbers: &Numbers) -> Option<Self> {
+        let target = |(target, path): &(VertexId, Option<Vec<VertexId>>)| {
+            let path = match path {
+                Some(path) => Some(numbers.path(path)?),
+                None => None,
+            };
+            Some((numbers.vertex(*target)?, path))
+        };
+        Some(Self {
+            tile: self.tile,
+            border: numbers.path(&self.border)?,
+            targets: self.targets.iter().map(target).collect::<Option<_>>()?,
+            faces: Vec::new(),
+            anchor: match self.anchor {
+                Some(anchor) => Some(numbers.vertex(anchor)?),
+                None => None,
+            },
+        })
+    }
+}
+
+/// Plane coordinates of a tile's vertices.
+fn map(mesh: &TriangleMesh, task: &SpokeTask) -> Option<DiskMap> {
     let n = task.border.len();
     let mut along = vec![0.0];
     for k in 0..n {
@@ -88,7 +111,7 @@ pub(crate) fn map(tiled: &Tiled, task: &SpokeTask, numbers: &mut Numbers) -> Opt
             fixed.insert(v, end * (reach[k] / reach[reach.len() - 1]));
         }
     }
-    DiskMap::solve(mesh, &task.faces, &fixed, numbers)
+    DiskMap::solve(mesh, &fixed)
 }
 
 /// Angles proportional to `share`, none above half a turn, all together a full turn.
@@ -118,32 +141,46 @@ fn sector_angles(share: &[f64]) -> Vec<f64> {
 /// layout, and spares slivers.
 const CENTER: f64 = 0.25;
 
-/// Cuts the spokes of a tile into the mesh. Returns the site, and per target the path from the site to it.
-pub(crate) fn cut(
-    tiled: &mut Tiled,
-    task: &SpokeTask,
-    map: Option<DiskMap>,
-    snap: f64,
-) -> Result<(VertexId, Vec<Vec<VertexId>>), QuadMatchingError> {
-    let border = task.border.iter().copied().collect();
-    let mut cutter = Cutter::within(task.tile, &border, map.unwrap_or_default(), snap);
+/// The spokes of a tile, in the numbers of its disk.
+pub(crate) struct Spokes {
+    cuts: Cuts,
+    site: VertexId,
+    paths: Vec<Vec<VertexId>>,
+}
+
+impl Spokes {
+    /// Cuts them into the mesh. Returns the site, and per target the path from the site to it.
+    pub(crate) fn replay(self, tiled: &mut Tiled) -> (VertexId, Vec<Vec<VertexId>>) {
+        let replayed = self.cuts.replay(tiled);
+        (replayed.vertex(self.site), self.paths.iter().map(|path| replayed.path(path)).collect())
+    }
+}
+
+/// Cuts the spokes of a tile in a copy of it. The faces of other tiles stay as they are, so that this can be done for many at once.
+pub(crate) fn cut(tiled: &Tiled, task: &SpokeTask, snap: f64) -> Result<Spokes, QuadMatchingError> {
+    let (mut disk, own) = Numbers::with(|numbers| {
+        let disk = Disk::of(&tiled.refiner, task.faces.clone(), numbers);
+        (disk, task.within(numbers))
+    });
+    let blocked = QuadMatchingError::Blocked { tile: task.tile };
+    let Some(task) = own else { return Err(blocked) };
+    let border = disk.marks(&task.border);
+    let mut cutter = Cutter::within(&border, map(disk.mesh(), &task).unwrap_or_default(), snap);
     let site = match task.anchor {
         Some(vertex) => vertex,
-        None => cutter.center(tiled, &task.faces, DVec2::ZERO, CENTER),
+        None => cutter.center(&mut disk, DVec2::ZERO, CENTER),
     };
     for path in task.targets.iter().filter_map(|t| t.1.as_ref()) {
         cutter.block(path);
     }
     let mut paths = Vec::with_capacity(task.targets.len());
-    for (target, fixed) in &task.targets {
+    for (target, fixed) in task.targets {
         let path = match fixed {
-            Some(path) => path.clone(),
+            Some(path) => path,
             None => {
-                let path = match cutter.straight(tiled, site, *target) {
-                    Some(path) => path,
-                    None => cutter
-                        .detour(tiled, site, *target)
-                        .ok_or(QuadMatchingError::Blocked { tile: task.tile })?,
+                let straight = cutter.straight(&mut disk, site, target);
+                let Some(path) = straight.or_else(|| cutter.detour(&mut disk, site, target)) else {
+                    return Err(blocked);
                 };
                 cutter.block(&path);
                 path
@@ -151,42 +188,16 @@ pub(crate) fn cut(
         };
         paths.push(path);
     }
-    Ok((site, paths))
+    Ok(Spokes { cuts: disk.into_cuts(), site, paths })
 }
 
-/// Cuts a straight path between two border vertices of a region. Where that fails the old path is returned, which
-/// has more vertices now if edges of it were cut on the way.
-pub(crate) fn recut(
-    tiled: &mut Tiled,
-    task: &SpokeTask,
-    map: DiskMap,
-    old: &[VertexId],
-    snap: f64,
-) -> Vec<VertexId> {
-    let border = task.border.iter().copied().collect();
-    let mut cutter = Cutter::within(task.tile, &border, map, snap);
-    let (from, to) = (old[0], old[old.len() - 1]);
-    if let Some(path) = cutter.straight(tiled, from, to) {
-        return path;
-    }
-    let mut path = old.to_vec();
-    for (edge, vertex) in cutter.cuts {
-        if let Some(k) = path.windows(2).position(|w| key(w[0], w[1]) == edge) {
-            path.insert(k + 1, vertex);
-        }
-    }
-    path
-}
-
-/// Cuts paths into the mesh of one tile, straight in its map.
+/// Cuts paths into a disk, straight in its map.
 pub(crate) struct Cutter<'a> {
-    /// Edges that were cut, in order, and the vertices that cut them.
-    cuts: Vec<([VertexId; 2], VertexId)>,
     map: DiskMap,
-    border: &'a FxHashSet<VertexId>,
-    on_spoke: FxHashSet<VertexId>,
-    spoke_edges: BTreeSet<[VertexId; 2]>,
-    tile: u32,
+    /// Of the vertices before any cut: those on the border.
+    border: &'a [bool],
+    on_spoke: Vec<bool>,
+    spoke_edges: FxHashSet<[VertexId; 2]>,
     snap: f64,
 }
 
@@ -194,22 +205,33 @@ fn key(a: VertexId, b: VertexId) -> [VertexId; 2] {
     if a < b { [a, b] } else { [b, a] }
 }
 
+/// Whether a vertex is marked; later ones are not.
+fn is_marked(marks: &[bool], v: VertexId) -> bool {
+    marks.get(v.index()).copied().unwrap_or(false)
+}
+
 impl<'a> Cutter<'a> {
-    pub(crate) fn within(tile: u32, border: &'a FxHashSet<VertexId>, map: DiskMap, snap: f64) -> Self {
-        Self {
-            cuts: Vec::new(),
-            map,
-            border,
-            on_spoke: FxHashSet::default(),
-            spoke_edges: BTreeSet::new(),
-            tile,
-            snap,
-        }
+    pub(crate) fn within(border: &'a [bool], map: DiskMap, snap: f64) -> Self {
+        Self { map, border, on_spoke: Vec::new(), spoke_edges: FxHashSet::default(), snap }
     }
 
     pub(crate) fn block(&mut self, path: &[VertexId]) {
-        self.on_spoke.extend(path);
+        for v in path {
+            if self.on_spoke.len() <= v.index() {
+                self.on_spoke.resize(v.index() + 1, false);
+            }
+            self.on_spoke[v.index()] = true;
+        }
         self.spoke_edges.extend(path.windows(2).map(|w| key(w[0], w[1])));
+    }
+
+    fn is_border(&self, v: VertexId) -> bool {
+        is_marked(self.border, v)
+    }
+
+    /// Neither on the border nor on a spoke.
+    fn is_free(&self, v: VertexId) -> bool {
+        !self.is_border(v) && !is_marked(&self.on_spoke, v)
     }
 
     fn place(&self, v: VertexId) -> robust::Coord<f64> {
@@ -218,16 +240,15 @@ impl<'a> Cutter<'a> {
     }
 
     /// The vertex nearest to a place in the disk, or a new one there when none is within `near`.
-    pub(crate) fn center(&mut self, tiled: &mut Tiled, faces: &[FaceId], goal: DVec2, near: f64) -> VertexId {
-        let mesh = &tiled.refiner.part().mesh;
-        let inner = |v: &VertexId| !self.border.contains(v);
+    pub(crate) fn center(&mut self, disk: &mut Disk, goal: DVec2, near: f64) -> VertexId {
+        let mesh = disk.mesh();
         let nearest = if self.map.places().is_empty() {
             // Without a map all of them lie at the origin.
-            faces.iter().flat_map(|f| mesh.triangles[f.index()]).filter(inner).min()
+            mesh.vertices().find(|&v| !self.is_border(v))
         } else {
-            let squares = self.map.places().iter().filter(|(v, _)| inner(v));
+            let squares = mesh.vertices().zip(self.map.places()).filter(|&(v, _)| !self.is_border(v));
             squares
-                .map(|&(v, at)| (at.distance_squared(goal), v))
+                .map(|(v, at)| (at.distance_squared(goal), v))
                 .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
                 .map(|(_, v)| v)
         };
@@ -244,8 +265,8 @@ impl<'a> Cutter<'a> {
             let least = w.into_iter().fold(f64::INFINITY, f64::min);
             (if area > 0.0 && least.is_finite() { least } else { f64::NEG_INFINITY }, w)
         };
-        let mut best = (f64::NEG_INFINITY, [1.0 / 3.0; 3], faces[0]);
-        for &f in faces {
+        let mut best = (f64::NEG_INFINITY, [1.0 / 3.0; 3], FaceId::new(0));
+        for f in mesh.faces() {
             let (least, w) = score(f);
             if least > best.0 {
                 best = (least, w, f);
@@ -257,7 +278,7 @@ impl<'a> Cutter<'a> {
         weights.iter_mut().for_each(|w| *w /= sum);
         let corners = mesh.triangles[best.2.index()];
         let place = (0..3).map(|k| weights[k] * self.map.at(corners[k])).sum();
-        let vertex = tiled.split_face(best.2, weights);
+        let vertex = disk.split_face(best.2, weights);
         self.map.add(vertex, place);
         vertex
     }
@@ -266,17 +287,16 @@ impl<'a> Cutter<'a> {
     /// spoke or the border, which needs a degenerate map; what was cut until then stays and does no harm.
     pub(crate) fn straight(
         &mut self,
-        tiled: &mut Tiled,
+        disk: &mut Disk,
         site: VertexId,
         target: VertexId,
     ) -> Option<Vec<VertexId>> {
         let mut path = vec![site];
         let mut current = site;
         // Each step crosses one edge; a straight line crosses none twice.
-        let most = 10 * tiled.tile_of_face.len();
+        let most = 10 * disk.mesh().face_count();
         for _ in 0..most {
-            let inside = |h: HalfEdgeId| tiled.tile(h) == self.tile && !tiled.is_border(h);
-            if tiled.refiner.around(current).any(|h| tiled.refiner.target(h) == target && inside(h)) {
+            if disk.around(current).any(|h| disk.target(h) == target && !disk.is_border(h)) {
                 path.push(target);
                 return Some(path);
             }
@@ -284,11 +304,8 @@ impl<'a> Cutter<'a> {
             let mut next = None;
             // What ends one wedge begins the next one.
             let mut before = None;
-            for h in tiled.refiner.around(current) {
-                if tiled.tile(h) != self.tile {
-                    continue;
-                }
-                let (a, b) = (tiled.refiner.target(h), tiled.refiner.origin(h.prev()));
+            for h in disk.around(current) {
+                let (a, b) = (disk.target(h), disk.origin(h.prev()));
                 let (at_a, to_a) = before.filter(|&(v, _)| v == a).map_or_else(
                     || {
                         let at = self.place(a);
@@ -308,19 +325,17 @@ impl<'a> Cutter<'a> {
             let (across, a, b, to_a, to_b) = next?;
             // Where the segment crosses a-b: distances of a and b from the line are in the ratio of the areas.
             let t = if to_a + to_b > 0.0 { to_a / (to_a + to_b) } else { 0.5 };
-            let free = |v: VertexId| !self.border.contains(&v) && !self.on_spoke.contains(&v);
-            let vertex = if t <= self.snap && free(a) {
+            let vertex = if t <= self.snap && self.is_free(a) {
                 a
-            } else if t >= 1.0 - self.snap && free(b) {
+            } else if t >= 1.0 - self.snap && self.is_free(b) {
                 b
-            } else if self.spoke_edges.contains(&key(a, b)) || tiled.is_border(across) {
+            } else if self.spoke_edges.contains(&key(a, b)) || disk.is_border(across) {
                 return None;
             } else {
                 let t = t.clamp(0.02, 0.98);
                 let place = self.map.at(a).lerp(self.map.at(b), t);
-                let vertex = tiled.split_edge(across, t);
+                let vertex = disk.split_edge(across, t);
                 self.map.add(vertex, place);
-                self.cuts.push((key(a, b), vertex));
                 vertex
             };
             if path.contains(&vertex) {
@@ -334,23 +349,21 @@ impl<'a> Cutter<'a> {
 
     /// The shortest path along mesh edges inside the tile that meets no other spoke. Where none is free, the edges
     /// that bar the way are split: those inside with both ends on the border or on spokes.
-    fn detour(&mut self, tiled: &mut Tiled, site: VertexId, target: VertexId) -> Option<Vec<VertexId>> {
+    fn detour(&mut self, disk: &mut Disk, site: VertexId, target: VertexId) -> Option<Vec<VertexId>> {
         for _ in 0..4 {
-            if let Some(path) = self.search(tiled, site, target) {
+            if let Some(path) = self.search(disk, site, target) {
                 return Some(path);
             }
-            let taken = |v: VertexId| self.border.contains(&v) || self.on_spoke.contains(&v);
-            let bars: Vec<[VertexId; 2]> = (0..tiled.tile_of_face.len() * 3)
+            let bars: Vec<[VertexId; 2]> = (0..disk.mesh().face_count() * 3)
                 .map(HalfEdgeId::new)
-                .filter(|&h| tiled.tile(h) == self.tile && tiled.refiner.twin(h).0 > h.0)
-                .filter(|&h| !tiled.is_border(h))
-                .map(|h| key(tiled.refiner.origin(h), tiled.refiner.target(h)))
-                .filter(|edge| !self.spoke_edges.contains(edge) && edge.iter().all(|&v| taken(v)))
+                .filter(|&h| !disk.is_border(h) && disk.twin(h).0 > h.0)
+                .map(|h| key(disk.origin(h), disk.target(h)))
+                .filter(|edge| !self.spoke_edges.contains(edge) && !edge.iter().any(|&v| self.is_free(v)))
                 .collect();
             for [a, b] in bars {
-                if let Some(h) = tiled.refiner.half_edge(a, b) {
+                if let Some(h) = disk.half_edge(a, b) {
                     let place = self.map.at(a).lerp(self.map.at(b), 0.5);
-                    let vertex = tiled.split_edge(h, 0.5);
+                    let vertex = disk.split_edge(h, 0.5);
                     self.map.add(vertex, place);
                 }
             }
@@ -358,15 +371,14 @@ impl<'a> Cutter<'a> {
         None
     }
 
-    fn search(&self, tiled: &Tiled, site: VertexId, target: VertexId) -> Option<Vec<VertexId>> {
+    fn search(&self, disk: &Disk, site: VertexId, target: VertexId) -> Option<Vec<VertexId>> {
         let mut from: FxHashMap<VertexId, VertexId> = FxHashMap::from_iter([(site, site)]);
         let mut queue = VecDeque::from([site]);
         while let Some(v) = queue.pop_front() {
-            for h in tiled.refiner.around(v) {
-                let w = tiled.refiner.target(h);
-                let inside = tiled.tile(h) == self.tile && !tiled.is_border(h);
-                let free = w == target || (!self.border.contains(&w) && !self.on_spoke.contains(&w));
-                if inside && free && !from.contains_key(&w) {
+            for h in disk.around(v) {
+                let w = disk.target(h);
+                let free = w == target || self.is_free(w);
+                if !disk.is_border(h) && free && !from.contains_key(&w) {
                     from.insert(w, v);
                     if w == target {
                         let mut path = vec![w];

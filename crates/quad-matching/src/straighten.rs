@@ -5,12 +5,13 @@
 //! ends opposite to each other, and the edge is cut anew along the diameter. Edges on features stay as they are.
 
 use crate::QuadMatchingError;
+use crate::disk::{Disk, Numbers};
 use crate::refine::Regions;
-use crate::spokes::{self, SpokeTask};
+use crate::spokes::Cutter;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
-use topipe_mesh::disk_map::{DiskMap, Numbers};
+use topipe_mesh::disk_map::DiskMap;
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, VertexId};
 use topipe_progress::Progress;
 
@@ -96,7 +97,12 @@ fn straighten_one(
     faces.sort_unstable();
 
     // b at half a turn, a at 0: each chain fills a half circle by its length.
-    let mesh = &tiled.refiner.part().mesh;
+    let (mut disk, own) = Numbers::with(|numbers| {
+        let disk = Disk::of(&tiled.refiner, faces, numbers);
+        (disk, (numbers.path(&to_a), numbers.path(&to_b), numbers.vertex(a), numbers.vertex(b)))
+    });
+    let (Some(to_a), Some(to_b), Some(a), Some(b)) = own else { return Ok(()) };
+    let mesh = disk.mesh();
     let mut fixed: FxHashMap<VertexId, glam::DVec2> =
         FxHashMap::with_capacity_and_hasher(border.len(), Default::default());
     for (chain, end, start_angle) in [(&to_a, a, PI), (&to_b, b, 0.0)] {
@@ -109,14 +115,16 @@ fn straighten_one(
             along += points[k].distance(points[k + 1]);
         }
     }
-    let Some(map) = DiskMap::solve(mesh, &faces, &fixed, &mut Numbers::default()) else { return Ok(()) };
+    let Some(map) = DiskMap::solve(mesh, &fixed) else { return Ok(()) };
     // A region much longer than wide crowds its far ends: there the straight line is no better than the old path.
     if map.flipped() > 0 {
         return Ok(());
     }
-    faces.iter().for_each(|f| tiled.tile_of_face[f.index()] = id);
-    let task = SpokeTask { tile: id, border, targets: Vec::new(), faces, anchor: None };
-    let path = spokes::recut(tiled, &task, map, &path, snap);
+    let border = disk.marks(to_a.iter().chain(&to_b));
+    let Some(path) = Cutter::within(&border, map, snap).straight(&mut disk, a, b) else { return Ok(()) };
+    let replayed = disk.into_cuts().replay(tiled);
+    let path = replayed.path(&path);
+    replayed.faces.iter().for_each(|f| tiled.tile_of_face[f.index()] = id);
 
     // What lies to the right of the new path belongs to the other region again.
     let key = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];

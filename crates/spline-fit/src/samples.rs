@@ -6,7 +6,7 @@
 
 use glam::DVec2;
 use rustc_hash::FxHashMap;
-use topipe_mesh::disk_map::{DiskMap, Numbers};
+use topipe_mesh::disk_map::DiskMap;
 use topipe_mesh::{DVec3, FaceId, TriangleMesh, VertexId};
 use topipe_quad_matching::QuadLayout;
 
@@ -172,7 +172,7 @@ pub(crate) fn sample(layout: &QuadLayout, quad: usize, faces: &[FaceId]) -> Opti
     }
     let mesh = &piece.mesh;
     let all: Vec<FaceId> = mesh.faces().collect();
-    let map = DiskMap::solve(mesh, &all, &piece.fixed, &mut Numbers::default())?;
+    let map = DiskMap::solve(mesh, &piece.fixed)?;
     let area: f64 = all.iter().map(|&f| mesh.area_vector(f).length() / 2.0).sum();
     // The vertices of the mesh inside: the tip of a spike is one of them.
     let mut tips = vec![(0.0, DVec3::ZERO); corners];

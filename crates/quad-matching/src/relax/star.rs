@@ -1,49 +1,63 @@
 //! The regions around a macro-vertex, and their maps to a disk.
 //!
-//! What all attempts to relax one vertex have in common is found once: the faces, their border, and the equations of the map,
-//! which differ between attempts in the places of the border alone.
+//! What all attempts to relax one vertex have in common is found once: a copy of the faces, their border, and the equations of the
+//! map, which differ between attempts in the places of the border alone. Vertices have the numbers of the copy.
 
-use super::marks::Marks;
-use super::{Corner, Fan, PLANS, Plan, path};
+use super::{Corner, Fan, PLANS, Plan, Task, path};
+use crate::cost::{corner, taper};
+use crate::disk::{Disk, Numbers};
+use crate::pairing::face_angle;
 use crate::refine::Regions;
-use crate::sides::Tiled;
 use glam::{DMat2, DVec2};
-use rustc_hash::{FxHashMap, FxHashSet};
 use std::f64::consts::{PI, TAU};
-use topipe_mesh::disk_map::{DiskMap, DiskSystem, Numbers};
-use topipe_mesh::{DVec3, FaceId, HalfEdgeId, TriangleMesh, VertexId};
+use topipe_mesh::disk_map::{DiskMap, DiskSystem};
+use topipe_mesh::{DVec3, FaceId, TriangleMesh, VertexId};
 
 /// A star as it is between attempts.
 pub(super) struct Star<'a> {
-    pub(super) v: usize,
     pub(super) fan: &'a Fan,
-    /// Its regions, in the order of the corners.
-    pub(super) members: Vec<usize>,
+    pub(super) disk: Disk,
+    pub(super) vertex: VertexId,
     /// From the far end of the first out-side around to the far end of the last in-side, without that.
     pub(super) ring: Vec<VertexId>,
     /// The vertex after the ring: its first one again, where the fan is closed.
-    ring_end: VertexId,
+    pub(super) ring_end: VertexId,
     /// Where in the ring each region begins.
     pub(super) begins: Vec<usize>,
-    /// All border vertices: the ring, and the features beside an open fan.
-    pub(super) border: FxHashSet<VertexId>,
+    /// Marks all border vertices: the ring, and the features beside an open fan.
+    pub(super) border: Vec<bool>,
     /// The features beside an open fan: from the vertex, and to it.
     beside: [Vec<VertexId>; 2],
     /// The edges that are cut anew, as out-sides of the corners after them, and their far ends.
     pub(super) spokes: Vec<Corner>,
     pub(super) targets: Vec<VertexId>,
-    pub(super) faces: Vec<FaceId>,
+    /// Of each region with four sides the lengths of the two that are not joined to the vertex.
+    far_sides: Vec<Option<[f64; 2]>>,
     /// The equations, once they are needed; the inner option is none where they are singular.
     system: Option<Option<DiskSystem>>,
     /// The map of each plan, likewise.
     maps: [Option<Option<DiskMap>>; PLANS.len()],
 }
 
+/// How the edges of a star run: as they are, or cut anew.
+pub(super) struct Spread {
+    pub(super) site: VertexId,
+    /// The spokes, from the site on.
+    pub(super) paths: Vec<Vec<VertexId>>,
+    /// The corner of the fan each face belongs to.
+    pub(super) labels: Vec<u32>,
+}
+
 impl<'a> Star<'a> {
-    /// None where the regions are no disk together.
-    pub(super) fn new(regions: &Regions, v: usize, fan: &'a Fan, seen: &mut Marks) -> Option<Self> {
+    /// With what is there now; `faces` are those of each region. None where the regions are no disk together.
+    pub(super) fn new(
+        regions: &Regions,
+        faces: &[Vec<FaceId>],
+        (v, fan): Task<'a>,
+        numbers: &mut Numbers,
+    ) -> Option<(Self, Spread)> {
         let members: Vec<usize> = fan.corners.iter().map(|c| c.0).collect();
-        if members.iter().collect::<FxHashSet<_>>().len() != members.len() {
+        if (1..members.len()).any(|k| members[..k].contains(&members[k])) {
             return None;
         }
         let n = fan.corners.len();
@@ -59,62 +73,110 @@ impl<'a> Star<'a> {
             }
         }
         let mut ring_end = ring.first().copied();
-        let mut border = ring.clone();
         let mut beside = [Vec::new(), Vec::new()];
         if !fan.closed {
             let (r, k) = fan.corners[n - 1];
             let count = regions.sides[r].len();
             let (out, into) = (path(regions, fan.corners[0]), path(regions, (r, (k + count - 1) % count)));
             ring_end = into.first().copied();
-            border.extend(&into[..into.len() - 1]);
-            border.extend(&out[..out.len() - 1]);
             beside = [out, into];
         }
-        let ring_end = ring_end?;
-        let count = border.len();
-        let border: FxHashSet<VertexId> = border.into_iter().collect();
-        if border.len() != count {
-            return None;
+        let of_member = |(label, &r): (usize, &usize)| faces[r].iter().map(move |&f| (f, label as u32));
+        let mut own: Vec<(FaceId, u32)> = members.iter().enumerate().flat_map(of_member).collect();
+        // Whatever the fan begins with, the numbers are the same.
+        own.sort_unstable();
+        let labels = own.iter().map(|face| face.1).collect();
+        let own = own.into_iter().map(|face| face.0).collect();
+        let disk = Disk::of(&regions.tiled.refiner, own, numbers);
+        let ring = numbers.path(&ring)?;
+        let [out, into] = [numbers.path(&beside[0])?, numbers.path(&beside[1])?];
+        let mut border = vec![false; disk.mesh().vertex_count()];
+        for v in ring.iter().chain(out.iter().rev().skip(1)).chain(into.iter().rev().skip(1)) {
+            if std::mem::replace(&mut border[v.index()], true) {
+                return None;
+            }
         }
         let spokes: Vec<Corner> = if fan.closed { fan.corners.clone() } else { fan.corners[1..].to_vec() };
-        let far_end = |&corner: &Corner| {
-            let path = path(regions, corner);
-            path[path.len() - 1]
-        };
-        let targets = spokes.iter().map(far_end).collect();
-        let faces = flood(&regions.tiled, regions.vertices[v], &members, seen);
-        let maps = [None, None, None];
-        Some(Self {
-            v,
+        let paths: Vec<Vec<VertexId>> =
+            spokes.iter().map(|&corner| numbers.path(&path(regions, corner))).collect::<Option<_>>()?;
+        let targets = paths.iter().map(|path| path[path.len() - 1]).collect();
+        let far_sides = fan.corners.iter().map(|&(r, k)| {
+            let count = regions.sides[r].len();
+            let mesh = &regions.tiled.refiner.part().mesh;
+            (count == 4).then(|| [1, 2].map(|i| length(mesh, &path(regions, (r, (k + i) % count)))))
+        });
+        let far_sides = far_sides.collect();
+        let vertex = numbers.vertex(regions.vertices[v])?;
+        let star = Self {
             fan,
-            members,
+            vertex,
             ring,
-            ring_end,
+            ring_end: numbers.vertex(ring_end?)?,
             begins,
             border,
-            beside,
+            beside: [out, into],
             spokes,
             targets,
-            faces,
+            far_sides,
             system: None,
-            maps,
-        })
+            maps: [None, None, None],
+            disk,
+        };
+        Some((star, Spread { site: vertex, paths, labels }))
+    }
+
+    /// The cost of the corners that edges from a vertex have to do with: those at the vertex, and at the far ends of the
+    /// edges on either hand; and of the quads around it. Not all of it where that is more than `limit` already: no part is
+    /// negative.
+    pub(super) fn cost(&self, spread: &Spread, limit: f64) -> f64 {
+        let mesh = self.disk.mesh();
+        let at = |v: VertexId, label: usize| {
+            let own = self.disk.around(v).filter(|h| spread.labels[h.face().index()] as usize == label);
+            corner(own.map(|h| face_angle(mesh, h)).sum())
+        };
+        let n = self.fan.corners.len();
+        // The edge before corner `i`, which is a feature at the beginning of an open fan, and at its end.
+        let spoke = |i: usize| match self.fan.closed {
+            true => &spread.paths[i % n],
+            false if i == 0 => &self.beside[0],
+            false => spread.paths.get(i - 1).unwrap_or(&self.beside[1]),
+        };
+        let mut sum = 0.0;
+        let mut before = length(mesh, spoke(0));
+        for i in 0..n {
+            let after = length(mesh, spoke(i + 1));
+            sum += at(spread.site, i);
+            if let Some([next, opposite]) = self.far_sides[i] {
+                sum += taper([before, next, opposite, after]);
+            }
+            if self.fan.closed || i > 0 {
+                sum += at(spoke(i)[spoke(i).len() - 1], i);
+            }
+            if self.fan.closed || i + 1 < n {
+                sum += at(spoke(i + 1)[spoke(i + 1).len() - 1], i);
+            }
+            if sum > limit {
+                break;
+            }
+            before = after;
+        }
+        sum
     }
 
     /// The map to the disk with the border as planned; none where there is none that is one-to-one, or no other than for a plan
-    /// before.
-    pub(super) fn map(&mut self, mesh: &TriangleMesh, plan: Plan, numbers: &mut Numbers) -> Option<&DiskMap> {
+    /// before. Only while nothing is cut.
+    pub(super) fn map(&mut self, plan: Plan) -> Option<&DiskMap> {
         let at = plan as usize;
         if self.maps[at].is_none() {
-            self.maps[at] = Some(self.mapped(mesh, plan, numbers));
+            self.maps[at] = Some(self.mapped(plan));
         }
         self.maps[at].as_ref()?.as_ref()
     }
 
-    fn mapped(&mut self, mesh: &TriangleMesh, plan: Plan, numbers: &mut Numbers) -> Option<DiskMap> {
-        let Self { fan, ref ring, ring_end, ref begins, ref border, ref faces, .. } = *self;
-        let system =
-            self.system.get_or_insert_with(|| DiskSystem::new(mesh, faces, |v| border.contains(&v), numbers));
+    fn mapped(&mut self, plan: Plan) -> Option<DiskMap> {
+        let Self { fan, ref disk, ref ring, ring_end, ref begins, ref border, .. } = *self;
+        let mesh = disk.mesh();
+        let system = self.system.get_or_insert_with(|| DiskSystem::new(mesh, |v| border[v.index()]));
         let system = system.as_ref()?;
         let n = fan.corners.len();
         let sector = if fan.closed { TAU } else { 0.95 * PI };
@@ -137,7 +199,7 @@ impl<'a> Star<'a> {
         for round in 0..=SHEAR_ROUNDS {
             if let Some(equal) = equal.filter(|_| round == 0) {
                 let Some(equal) = equal else { break };
-                let better = shear(mesh, faces, equal).and_then(|shear| equal_on_surface(shear, n, sector));
+                let better = shear(mesh, equal).and_then(|shear| equal_on_surface(shear, n, sector));
                 let Some(better) = better else { break };
                 let change = turned(&angles, &better);
                 angles = better;
@@ -146,8 +208,7 @@ impl<'a> Star<'a> {
                 }
                 continue;
             }
-            let mut fixed: FxHashMap<VertexId, DVec2> =
-                FxHashMap::with_capacity_and_hasher(border.len(), Default::default());
+            let mut fixed = vec![DVec2::ZERO; border.len()];
             for i in 0..n {
                 let (end, stop) =
                     if i + 1 < n { (begins[i + 1], ring[begins[i + 1]]) } else { (ring.len(), ring_end) };
@@ -160,15 +221,12 @@ impl<'a> Star<'a> {
                 place(&mut fixed, mesh, &self.beside[0], |share| DVec2::new(share, 0.0));
                 place(&mut fixed, mesh, &self.beside[1], |share| DVec2::from_angle(sector) * (1.0 - share));
             }
-            let Some(solved) = system.solve(|v| fixed.get(&v).copied()) else { break };
+            let Some(solved) = system.solve(|v| Some(fixed[v.index()])) else { break };
             if solved.flipped() > 0 {
                 break;
             }
-            let sheared = if plan == Plan::Sheared && round < SHEAR_ROUNDS {
-                shear(mesh, faces, &solved)
-            } else {
-                None
-            };
+            let sheared =
+                if plan == Plan::Sheared && round < SHEAR_ROUNDS { shear(mesh, &solved) } else { None };
             map = Some(solved);
             let Some(shear) = sheared else { break };
             let Some(better) = equal_on_surface(shear, n, sector) else { break };
@@ -191,10 +249,9 @@ fn turned(before: &[f64], after: &[f64]) -> f64 {
 const SHEAR_ROUNDS: usize = 2;
 
 /// The linear map from the tangent plane at the centre of the disk to the disk, by least squares over the faces there.
-fn shear(mesh: &TriangleMesh, faces: &[FaceId], map: &DiskMap) -> Option<DMat2> {
-    let near: Vec<FaceId> = faces
-        .iter()
-        .copied()
+fn shear(mesh: &TriangleMesh, map: &DiskMap) -> Option<DMat2> {
+    let near: Vec<FaceId> = mesh
+        .faces()
         .filter(|f| mesh.triangles[f.index()].iter().any(|&v| map.at(v).length() < NEAR))
         .collect();
     let normal = near.iter().map(|&f| mesh.area_vector(f)).sum::<DVec3>().try_normalize()?;
@@ -242,39 +299,18 @@ fn equal_on_surface(shear: DMat2, n: usize, sector: f64) -> Option<Vec<f64>> {
 }
 
 /// Places a chain of vertices but for its last by its length.
-fn place(
-    fixed: &mut FxHashMap<VertexId, DVec2>,
-    mesh: &TriangleMesh,
-    chain: &[VertexId],
-    at: impl Fn(f64) -> DVec2,
-) {
+fn place(fixed: &mut [DVec2], mesh: &TriangleMesh, chain: &[VertexId], at: impl Fn(f64) -> DVec2) {
     let points: Vec<DVec3> = chain.iter().map(|&v| mesh.position(v)).collect();
     let total: f64 = points.windows(2).map(|w| w[0].distance(w[1])).sum();
     let mut along = 0.0;
     for k in 0..chain.len() - 1 {
         let share = if total > 0.0 { along / total } else { k as f64 / (chain.len() - 1) as f64 };
-        fixed.insert(chain[k], at(share));
+        fixed[chain[k].index()] = at(share);
         along += points[k].distance(points[k + 1]);
     }
 }
 
-/// All faces of the given regions; they hang together around `vertex`.
-fn flood(tiled: &Tiled, vertex: VertexId, members: &[usize], seen: &mut Marks) -> Vec<FaceId> {
-    let inside = |f: FaceId| members.contains(&(tiled.tile_of_face[f.index()] as usize));
-    let mut faces: Vec<FaceId> =
-        tiled.refiner.around(vertex).map(HalfEdgeId::face).filter(|&f| inside(f)).collect();
-    seen.clear(tiled.tile_of_face.len());
-    faces.iter().for_each(|f| _ = seen.set(f.index()));
-    let mut next = 0;
-    while next < faces.len() {
-        for k in 0..3 {
-            let beyond = tiled.refiner.twin(HalfEdgeId::of(faces[next], k)).face();
-            if inside(beyond) && seen.set(beyond.index()) {
-                faces.push(beyond);
-            }
-        }
-        next += 1;
-    }
-    faces.sort_unstable();
-    faces
+/// The length of a path.
+fn length(mesh: &TriangleMesh, path: &[VertexId]) -> f64 {
+    path.windows(2).map(|w| mesh.position(w[0]).distance(mesh.position(w[1]))).sum()
 }
