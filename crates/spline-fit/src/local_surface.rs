@@ -130,10 +130,16 @@ pub(crate) fn local_surface(patches: &[&PatchSamples], at: DVec3, known: Known, 
             let row = [1.0, u, v, u * u / 2.0, u * v, v * v / 2.0];
             total += weight;
             for i in 0..6 {
-                b[i] += weight * row[i] * w;
-                for j in 0..6 {
-                    a[i][j] += weight * row[i] * row[j];
+                let weighted = weight * row[i];
+                b[i] += weighted * w;
+                for j in 0..=i {
+                    a[i][j] += weighted * row[j];
                 }
+            }
+        }
+        for i in 0..6 {
+            for j in i + 1..6 {
+                a[i][j] = a[j][i];
             }
         }
         if total.is_nan() || total <= 0.0 {

@@ -36,12 +36,35 @@ pub(crate) struct Net {
 impl Net {
     /// The largest distance of a sample from the point with its parameters, mm.
     pub(crate) fn farthest(&self, samples: &PatchSamples) -> f64 {
-        self.distances(samples).into_iter().fold(0.0, f64::max)
+        self.each_distance(samples).fold(0.0, f64::max)
+    }
+
+    /// True where no sample is farther than this from the point with its parameters, mm.
+    pub(crate) fn is_within(&self, distance: f64, samples: &PatchSamples) -> bool {
+        !self.each_distance(samples).any(|off| off > distance)
     }
 
     /// The distance of each sample from the point with its parameters, mm.
     pub(crate) fn distances(&self, samples: &PatchSamples) -> Vec<f64> {
-        samples.samples.iter().map(|s| self.evaluate(s.u, s.v).position.distance(s.point)).collect()
+        self.each_distance(samples).collect()
+    }
+
+    fn each_distance(&self, samples: &PatchSamples) -> impl Iterator<Item = f64> {
+        samples.samples.iter().map(|s| self.position(s.u, s.v).distance(s.point))
+    }
+
+    /// The point alone: the same bits as [`Self::evaluate`] gives, in half of the time.
+    pub(crate) fn position(&self, u: f64, v: f64) -> DVec3 {
+        let width = self.basis_u.len();
+        let ([i, j], values, _) = hermite::local_pair([width / 2 - 1, self.basis_v.len() / 2 - 1], [u, v]);
+        let mut position = DVec3::ZERO;
+        for l in 0..4 {
+            let row = &self.control[(j + l) * width + i..][..4];
+            let mut along = DVec3::ZERO;
+            (0..4).for_each(|k| along += values[k].x * row[k]);
+            position += values[l].y * along;
+        }
+        position
     }
 
     pub(crate) fn evaluate(&self, u: f64, v: f64) -> SurfacePoint {

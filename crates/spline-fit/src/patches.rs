@@ -20,8 +20,6 @@ pub(crate) struct Fitted {
     pub(crate) borders: [Border; 4],
     pub(crate) corners: [DVec3; 4],
     pub(crate) net: Net,
-    /// Parameters of the samples' foot points.
-    places: Vec<[f64; 2]>,
     /// The largest distance of a sample, mm.
     pub(crate) farthest: f64,
 }
@@ -32,6 +30,8 @@ pub(crate) struct Patches<'a> {
     pub(crate) parameters: &'a Parameters,
     pub(crate) units: &'a Units,
     pub(crate) progress: &'a Progress,
+    /// Parameters that the samples of each patch begin with.
+    pub(crate) starts: Vec<Vec<[f64; 2]>>,
     /// The keys of the samples as they begin, where patches are kept.
     pub(crate) samples: Vec<UnitKey>,
 }
@@ -94,11 +94,12 @@ impl Patches<'_> {
             .enumerate()
             .map(|(quad, ((samples, before), (borders, corners)))| {
                 progress.check()?;
-                // Knots were inserted elsewhere.
+                // Knots were inserted elsewhere; the samples are where the fit has moved them.
                 if let Some(same) = before.filter(|b| b.borders == *borders && b.corners == *corners) {
-                    put(samples, &same.places);
                     return Ok(same);
                 }
+                // Each refinement starts from the same parameters: what a patch becomes does not depend on the way there.
+                put(samples, &self.starts[quad]);
                 let task = PatchTask::new(borders, corners, &grams, parameters, near_enough);
                 let compute = |samples: &mut PatchSamples| {
                     task.unfolded(samples).ok_or_else(|| {
@@ -114,8 +115,8 @@ impl Patches<'_> {
                 if count.is_multiple_of(64) {
                     progress.step(count, layout.quads.len() as u64, "patches");
                 }
-                let (places, farthest) = (places(samples), net.farthest(samples));
-                Ok(Fitted { borders: borders.clone(), corners: *corners, net, places, farthest })
+                let farthest = net.farthest(samples);
+                Ok(Fitted { borders: borders.clone(), corners: *corners, net, farthest })
             })
             // The first error in the order of the quads, for any number of threads.
             .collect::<Vec<Result<Fitted, SplineFitError>>>()
@@ -183,7 +184,7 @@ impl<'a> PatchTask<'a> {
         let bending = factor * (1.0 - self.parameters.lambda);
         let mut net = fit_patch(samples, self.borders, self.grams, bending)?;
         for _ in 0..self.parameters.foot_point_rounds {
-            if net.farthest(samples) <= self.near_enough {
+            if net.is_within(self.near_enough, samples) {
                 break;
             }
             crate::foot_points::correct(samples, |u, v| net.evaluate(u, v));

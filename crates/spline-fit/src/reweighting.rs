@@ -108,7 +108,7 @@ fn overshoot(net: &Net, samples: &PatchSamples) -> f64 {
     // Neighbouring points are often near the same samples.
     let mut last = 0;
     for (u, v) in grid {
-        let p = net.evaluate(u, v).position;
+        let p = net.position(u, v);
         let mut least = f64::INFINITY;
         for k in 0..blocks.len() {
             let block = (last + k) % blocks.len();

@@ -12,7 +12,7 @@ use crate::hermite;
 use crate::knot_insertion::insert_knots;
 use crate::network::{KnownFits, Network, network};
 use crate::patch_fit::Net;
-use crate::patches::{Fitted, Patches};
+use crate::patches::{Fitted, Patches, places};
 use crate::refinement::Refinement;
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
@@ -35,20 +35,13 @@ pub(crate) fn fit(
     setting.make_corners(&samples, parameters.spans as usize, progress);
     let setting = setting;
     let mut refinement = Refinement::new(&setting, parameters);
-    let places: Vec<Vec<[f64; 2]>> =
-        samples.iter().map(|s| s.samples.iter().map(|s| [s.u, s.v]).collect()).collect();
+    let starts = samples.par_iter().map(places).collect();
     let keys = if units.are_kept() { samples.par_iter().map(key_of).collect() } else { Vec::new() };
-    let patches = Patches { setting: &setting, parameters, units, progress, samples: keys };
+    let patches = Patches { setting: &setting, parameters, units, progress, starts, samples: keys };
     let mut before: Vec<Fitted> = Vec::new();
     let mut known = KnownFits::default();
     loop {
         progress.check()?;
-        // Each refinement starts from the same parameters: what a patch becomes does not depend on the way there.
-        for (samples, places) in samples.iter_mut().zip(&places) {
-            for (sample, place) in samples.samples.iter_mut().zip(places) {
-                [sample.u, sample.v] = *place;
-            }
-        }
         let network =
             network(&setting, &samples, refinement.spans(), &refinement.reach(&setting), &mut known)?;
         let mut fitted = patches.fit(&mut samples, &network, refinement.spans(), before)?;
@@ -83,8 +76,8 @@ pub(crate) fn first_patches(
         &mut KnownFits::default(),
     )?;
     let keys = samples.par_iter().map(key_of).collect();
-    let patches =
-        Patches { setting: &setting, parameters, units: &Units::none(), progress: &progress, samples: keys };
+    let (units, starts) = (&Units::none(), Vec::new());
+    let patches = Patches { setting: &setting, parameters, units, progress: &progress, starts, samples: keys };
     let (borders, corners) = patches.given(&network, refinement.spans());
     Ok(patches.keys(&borders, &corners))
 }
