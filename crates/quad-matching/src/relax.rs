@@ -142,8 +142,11 @@ pub(crate) fn relax(
         progress.check()?;
         progress.step(done as u64, all as u64, "vertices");
         let (shared, faces_now) = (&*regions, &faces[..]);
-        let found: Vec<Option<Change>> =
-            round.par_iter().map(|&task| try_plans(shared, faces_now, task, only_bad, snap)).collect();
+        let found: Vec<Option<Change>> = round
+            .par_iter()
+            .with_max_len(APART)
+            .map(|&task| try_plans(shared, faces_now, task, only_bad, snap))
+            .collect();
         for change in found.into_iter().flatten() {
             change.make(regions, &mut faces);
             changed += 1;
@@ -152,6 +155,9 @@ pub(crate) fn relax(
     }
     Ok(changed)
 }
+
+/// Stars given to a thread together.
+const APART: usize = 4;
 
 /// What is better around a vertex, in the numbers of a disk.
 struct Change<'a> {

@@ -92,6 +92,7 @@ impl Patches<'_> {
             .zip(before)
             .zip(borders.par_iter().zip(&corners))
             .enumerate()
+            .with_max_len(APART)
             .map(|(quad, ((samples, before), (borders, corners)))| {
                 progress.check()?;
                 // Knots were inserted elsewhere; the samples are where the fit has moved them.
@@ -140,6 +141,10 @@ const MOST_SPANS: usize = 16;
 fn side_spans(curve: &Curve, spans: usize) -> usize {
     curve.spans().min(MOST_SPANS).max(spans)
 }
+
+/// Patches given to a thread together: in the last rounds a few patches, side by side, are all the work. Left to itself rayon gave
+/// a thread up to a quarter of all.
+pub(crate) const APART: usize = 1;
 
 /// Factors on the bending energy with which a patch is tried until it is not turned over but for [`TIP`].
 const STIFFER: [f64; 5] = [1.0, 1e1, 1e2, 1e3, 1e4];

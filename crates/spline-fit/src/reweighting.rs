@@ -10,7 +10,7 @@
 
 use crate::SplineFitError;
 use crate::patch_fit::Net;
-use crate::patches::{Fitted, PatchTask, Patches, TIP, grams, places, put};
+use crate::patches::{APART, Fitted, PatchTask, Patches, TIP, grams, places, put};
 use crate::samples::PatchSamples;
 use rayon::prelude::*;
 use topipe_mesh::DVec3;
@@ -34,7 +34,7 @@ impl Patches<'_> {
         let tolerance = self.parameters.largest_distance(&self.setting.layout.part.mesh);
         let near_enough = self.parameters.near_enough(&self.setting.layout.part.mesh);
         let grams = grams(fitted.iter().map(|f| &f.borders));
-        fitted.par_iter_mut().zip(samples).try_for_each(|(fitted, samples)| {
+        fitted.par_iter_mut().zip(samples).with_max_len(APART).try_for_each(|(fitted, samples)| {
             self.progress.check()?;
             if fitted.farthest <= tolerance {
                 return Ok(());

@@ -77,7 +77,8 @@ pub(crate) fn first_patches(
     )?;
     let keys = samples.par_iter().map(key_of).collect();
     let (units, starts) = (&Units::none(), Vec::new());
-    let patches = Patches { setting: &setting, parameters, units, progress: &progress, starts, samples: keys };
+    let patches =
+        Patches { setting: &setting, parameters, units, progress: &progress, starts, samples: keys };
     let (borders, corners) = patches.given(&network, refinement.spans());
     Ok(patches.keys(&borders, &corners))
 }
