@@ -142,7 +142,7 @@ pub(crate) fn normal_cone(surface: &Surface, faces: &[FaceId]) -> (f64, FaceId) 
             (n.cross(sum).length().atan2(n.dot(sum)), n.length(), f)
         })
         .collect();
-    by_angle.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.2.cmp(&b.2)));
+    by_angle.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.2.cmp(&b.2)));
     let mut stray = STRAY * by_angle.iter().map(|e| e.1).sum::<f64>();
     for (angle, area, face) in by_angle {
         stray -= area;

@@ -22,16 +22,15 @@ const JOIN_ROUNDS: usize = 8;
 impl Construction<'_> {
     /// Cuts until all tiles are disks with simple borders and three corners. Returns the tiles that can not be helped
     /// because they are held by their own segments.
-    pub(crate) fn cut_to_disks(&mut self) -> Result<Vec<u32>, TilingError> {
+    pub(super) fn cut_to_disks(&mut self, recheck: &mut Recheck) -> Result<Vec<u32>, TilingError> {
         let mut held = Vec::new();
-        let mut recheck = Recheck::new(self);
         let mut stamps = Stamps::new(0);
         for round in 0..MOST_ROUNDS {
             self.progress.check()?;
             held.clear();
             let mut open = Vec::new();
             recheck.update(self);
-            let mut by_tile = recheck.faces_by_tile(self);
+            let mut by_tile = Recheck::faces_by_tile(self, &recheck.is_sound);
             stamps.grow(recheck.is_corner.len());
             let is_corner = &recheck.is_corner;
             let mut busy = vec![false; self.seeds.len()];

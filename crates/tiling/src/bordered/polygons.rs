@@ -6,6 +6,7 @@
 
 use super::Construction;
 use super::check::{Outline, Stamps, normal_cone, outline, slenderness};
+use super::recheck::Recheck;
 use crate::TilingError;
 use std::collections::BTreeMap;
 use topipe_mesh::{FaceId, HalfEdgeId};
@@ -57,10 +58,11 @@ struct Station {
 
 impl Construction<'_> {
     /// One round; true if a tile was divided.
-    pub(crate) fn divide_polygons(&mut self) -> Result<bool, TilingError> {
+    pub(super) fn divide_polygons(&mut self, recheck: &mut Recheck) -> Result<bool, TilingError> {
         self.progress.check()?;
-        let by_tile = self.faces_by_tile();
-        let is_corner = self.corner_vertices();
+        recheck.update(self);
+        let by_tile = Recheck::faces_by_tile(self, &recheck.is_small);
+        let is_corner = &recheck.is_corner;
         let mut stamps = Stamps::new(is_corner.len());
         let limit = self.parameters.normal_cone.to_radians();
         let mut divided = 0;
@@ -70,7 +72,7 @@ impl Construction<'_> {
             }
             let surface = &self.surface;
             let border = |h| surface.is_border(h);
-            let Ok(outline) = outline(surface, faces, border, &is_corner, &mut stamps) else { continue };
+            let Ok(outline) = outline(surface, faces, border, is_corner, &mut stamps) else { continue };
             let mesh = &surface.refiner.part().mesh;
             let area: f64 = faces
                 .iter()
@@ -90,6 +92,8 @@ impl Construction<'_> {
                 && self.divide(tile as u32, &outline, &stations, wide, slender)
             {
                 divided += 1;
+            } else {
+                recheck.is_small[tile] = true;
             }
         }
         if divided > 0 {

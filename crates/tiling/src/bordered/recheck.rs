@@ -15,6 +15,8 @@ pub(super) struct Recheck {
     pub(super) is_corner: Vec<bool>,
     /// Per tile: a disk with three corners, and nothing has changed around it since.
     pub(super) is_sound: Vec<bool>,
+    /// Per tile: it need not be divided, see [`super::polygons`], and nothing has changed around it since.
+    pub(super) is_small: Vec<bool>,
 }
 
 impl Recheck {
@@ -24,6 +26,7 @@ impl Recheck {
             owner: construction.surface.owner.clone(),
             is_corner: construction.corner_vertices(),
             is_sound: vec![false; construction.seeds.len()],
+            is_small: vec![false; construction.seeds.len()],
         }
     }
 
@@ -32,6 +35,7 @@ impl Recheck {
         let surface = &construction.surface;
         let mesh = &surface.refiner.part().mesh;
         self.is_sound.resize(construction.seeds.len(), false);
+        self.is_small.resize(construction.seeds.len(), false);
         self.is_corner.resize(mesh.vertex_count(), false);
         // Of a face that was split all new vertices are corners of new faces, too.
         let changed = (0..surface.owner.len()).filter(|&f| self.owner.get(f) != Some(&surface.owner[f]));
@@ -44,8 +48,11 @@ impl Recheck {
             let borders = around.iter().filter(|&&h| surface.is_border(h)).count();
             self.is_corner[v.index()] = borders > 2 || construction.is_node.get(v.index()) == Some(&true);
             for h in around {
-                if let Some(sound) = self.is_sound.get_mut(surface.owner[h.face().index()] as usize) {
-                    *sound = false;
+                let owner = surface.owner[h.face().index()] as usize;
+                for known in [&mut self.is_sound, &mut self.is_small] {
+                    if let Some(known) = known.get_mut(owner) {
+                        *known = false;
+                    }
                 }
             }
         }
@@ -53,11 +60,11 @@ impl Recheck {
         self.owner.clone_from(&surface.owner);
     }
 
-    /// The faces of the tiles that are to be looked at; the lists of the others are empty.
-    pub(super) fn faces_by_tile(&self, construction: &Construction<'_>) -> Vec<Vec<FaceId>> {
+    /// The faces of the tiles that are not `known`; the lists of the others are empty.
+    pub(super) fn faces_by_tile(construction: &Construction<'_>, known: &[bool]) -> Vec<Vec<FaceId>> {
         let mut faces = vec![Vec::new(); construction.seeds.len()];
         for (f, &owner) in construction.surface.owner.iter().enumerate() {
-            if owner != NONE && !self.is_sound[owner as usize] {
+            if owner != NONE && !known[owner as usize] {
                 faces[owner as usize].push(FaceId::new(f));
             }
         }

@@ -6,6 +6,7 @@
 //! no other tile but for new corners, so that it ends; see [`super::pieces`].
 
 use super::check::{Fault, Outline, Stamps, normal_cone, outline, slenderness};
+use super::recheck::Recheck;
 use super::surface::NONE;
 use super::{Construction, Seed};
 use crate::TilingError;
@@ -135,12 +136,13 @@ impl Construction<'_> {
         let mut near = DVec3::ZERO;
         for attempt in 0..ATTEMPTS {
             self.add_sites_where_asked(if attempt == 0 { SITE_ROUNDS } else { 2 })?;
-            left = self.cut_to_disks()?;
+            let mut recheck = Recheck::new(self);
+            left = self.cut_to_disks(&mut recheck)?;
             for _ in 0..DIVIDE_ROUNDS {
-                if !left.is_empty() || !self.divide_polygons()? {
+                if !left.is_empty() || !self.divide_polygons(&mut recheck)? {
                     break;
                 }
-                left = self.cut_to_disks()?;
+                left = self.cut_to_disks(&mut recheck)?;
             }
             if left.is_empty() {
                 return Ok(());
