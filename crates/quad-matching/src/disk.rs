@@ -273,9 +273,9 @@ mod tests {
         let mut disk = Disk::of(&tiled.refiner, (2..10).map(FaceId::new).collect(), &mut Numbers::default());
         let (mesh, half_edges) = (disk.mesh.clone(), disk.half_edges.clone());
         for k in 0..20 {
-            let h = (0..3 * disk.mesh.face_count()).map(HalfEdgeId::new).filter(|&h| !disk.is_border(h));
-            let h = { h }.nth(3 * k).unwrap();
-            disk.split_edge(h, 0.3);
+            let half_edges = (0..3 * disk.mesh.face_count()).map(HalfEdgeId::new);
+            let inner = half_edges.filter(|&h| !disk.is_border(h)).nth(3 * k).unwrap();
+            disk.split_edge(inner, 0.3);
             disk.split_face(FaceId::new(k), [0.2, 0.3, 0.5]);
         }
         disk.heal();
