@@ -14,6 +14,16 @@ impl Net {
     /// over: its normal points away from the normals at the corners, blended, and from that of the mesh there, which may
     /// turn over itself around a spike.
     pub(crate) fn folded(&self, corners: &[DVec3; 4], samples: &PatchSamples) -> f64 {
+        self.each_fold(corners, samples, |_| ())
+    }
+
+    /// The same, and the cell of the net that each such point lies in.
+    pub(crate) fn each_fold(
+        &self,
+        corners: &[DVec3; 4],
+        samples: &PatchSamples,
+        mut cell: impl FnMut([usize; 2]),
+    ) -> f64 {
         let (nu, nv) = (2 * self.basis_u.len(), 2 * self.basis_v.len());
         let spans = [self.basis_u.len() / 2 - 1, self.basis_v.len() / 2 - 1];
         let columns: Vec<_> =
@@ -38,7 +48,10 @@ impl Net {
                 let normal = self.combine(functions).normal();
                 let over = normal.dot(blended(corners, [u, v])) <= 0.0
                     && !samples.near([u, v], NEAR).any(|sample| normal.dot(sample.normal) > 0.0);
-                folded += usize::from(over);
+                if over {
+                    folded += 1;
+                    cell([column[0] / 2, row[1] / 2]);
+                }
             }
         }
         folded as f64 / ((nu + 1) * (nv + 1)) as f64

@@ -23,6 +23,7 @@ mod adapt;
 mod analytic_face;
 mod banded;
 pub mod basis;
+mod bending;
 mod borders;
 mod breaks;
 mod brep;
@@ -63,6 +64,7 @@ mod tangent_fit;
 mod tangents;
 mod tessellate;
 mod twist;
+mod unfolding;
 mod unit;
 mod unknowns;
 

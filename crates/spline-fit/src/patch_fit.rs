@@ -5,9 +5,9 @@
 //! other, and a patch knows nothing of its neighbours: this is what makes it a unit of work of its own.
 
 use crate::banded::Banded;
+use crate::bending::{Products, Stiffness, add_bending};
 use crate::breaks::Breaks;
 use crate::distances::add_distances;
-use crate::energy::Gram;
 use crate::hermite;
 use crate::samples::PatchSamples;
 use crate::{Basis, SurfacePoint};
@@ -118,13 +118,12 @@ fn on_side(at: usize, nu: usize, nv: usize) -> bool {
     i == 0 || j == 0 || i == nu - 1 || j == nv - 1
 }
 
-/// Fits the inside; `bending` is the weight of the bending energy against the mean squared distance. `None` when the
-/// equations are singular.
+/// Fits the inside. `None` when the equations are singular.
 pub(crate) fn fit_patch(
     samples: &PatchSamples,
     borders: &[Border; 4],
-    grams: [&Gram; 2],
-    bending: f64,
+    products: [&Products; 2],
+    stiffness: &Stiffness,
 ) -> Option<Net> {
     let (ku, kv) = (borders[0].spans, borders[1].spans);
     let (basis_u, basis_v) = (hermite::basis(ku), hermite::basis(kv));
@@ -169,32 +168,7 @@ pub(crate) fn fit_patch(
     let mut right = vec![DVec3::ZERO; count];
 
     add_distances(&samples.samples, [ku, kv], &control, &slots, &mut matrix, &mut right);
-    // Bending.
-    let reach = |k: usize, n: usize| k.saturating_sub(3)..(k + 4).min(n);
-    for j in 1..nv - 1 {
-        for i in 1..nu - 1 {
-            let Some(row) = slots[j * nu + i] else { continue };
-            for l in reach(j, nv) {
-                let across = [0, 1, 2].map(|d| grams[1].at(d, j, l));
-                for k in reach(i, nu) {
-                    let slot = slots[l * nu + k];
-                    // Above the diagonal, which nobody asks for.
-                    if slot.is_some_and(|column| column > row) {
-                        continue;
-                    }
-                    let value = bending
-                        * (grams[0].at(2, i, k) * across[0]
-                            + 2.0 * grams[0].at(1, i, k) * across[1]
-                            + grams[0].at(0, i, k) * across[2]);
-                    match slot {
-                        Some(column) => matrix.add(row, column, value),
-                        None => right[row] -= value * control[l * nu + k],
-                    }
-                }
-            }
-        }
-    }
-
+    add_bending(stiffness, products, &control, &slots, &mut matrix, &mut right);
     matrix.solve(&mut right)?;
     for (at, slot) in slots.iter().enumerate() {
         if let Some(slot) = slot {

@@ -1,7 +1,7 @@
 //! The patches of the fit with tangents, each for itself.
 
+use crate::bending::{Products, Stiffness};
 use crate::breaks::Breaks;
-use crate::energy::Gram;
 use crate::hermite;
 use crate::network::{Curve, Network};
 use crate::patch_fit::{Border, Net, fit_patch};
@@ -82,7 +82,7 @@ impl Patches<'_> {
         let (borders, corners) = self.given(network, spans);
         let keys = if units.are_kept() { self.keys(&borders, &corners) } else { Vec::new() };
         units.announce("patches", &keys);
-        let grams = grams(borders.iter());
+        let products = products(borders.iter());
         let near_enough = parameters.near_enough(&layout.part.mesh);
         let done = AtomicU64::new(0);
         let mut before: Vec<Option<Fitted>> = before.into_iter().map(Some).collect();
@@ -101,7 +101,7 @@ impl Patches<'_> {
                 }
                 // Each refinement starts from the same parameters: what a patch becomes does not depend on the way there.
                 put(samples, &self.starts[quad]);
-                let task = PatchTask::new(borders, corners, &grams, parameters, near_enough);
+                let task = PatchTask::new(borders, corners, &products, parameters, near_enough);
                 let compute = |samples: &mut PatchSamples| {
                     task.unfolded(samples).ok_or_else(|| {
                         let at = layout.part.mesh.position(layout.vertices[layout.corners(quad)[0] as usize]);
@@ -127,9 +127,9 @@ impl Patches<'_> {
 }
 
 /// The integrals of the bases with 1, 2, 4 ... spans, as many as the patches have.
-pub(crate) fn grams<'a>(borders: impl Iterator<Item = &'a [Border; 4]>) -> Vec<Gram> {
+pub(crate) fn products<'a>(borders: impl Iterator<Item = &'a [Border; 4]>) -> Vec<Products> {
     let most = borders.flatten().map(|b| b.spans).max().unwrap_or(1);
-    (0..=most.ilog2()).map(|k| Gram::new(&hermite::basis(1 << k))).collect()
+    (0..=most.ilog2()).map(|k| Products::new(1 << k)).collect()
 }
 
 /// Most spans of a side while the inside of a patch is fitted. The border of a ragged region has up to 64; a patch with two such
@@ -146,18 +146,11 @@ fn side_spans(curve: &Curve, spans: usize) -> usize {
 /// a thread up to a quarter of all.
 pub(crate) const APART: usize = 1;
 
-/// Factors on the bending energy with which a patch is tried until it is not turned over but for [`TIP`].
-const STIFFER: [f64; 5] = [1.0, 1e1, 1e2, 1e3, 1e4];
-/// Share of the points of a patch that may be turned over: the very tip of a spike, one or two points of a patch of eight spans.
-/// Stiffer patches until no point was, by factors of a hundred, cut notches off: largest deviation over the diagonal, x 1e-2, of
-/// support and bridge 0.29 and 0.19 then, 0.15 and 0.10 so; crossings of the nine parts, triangulated to 2e-3 of the diagonal, 104 and 66.
-pub(crate) const TIP: f64 = 2e-3;
-
 /// What a patch is fitted to, but for its samples.
 pub(crate) struct PatchTask<'a> {
-    borders: &'a [Border; 4],
+    pub(crate) borders: &'a [Border; 4],
     pub(crate) corners: &'a [DVec3; 4],
-    grams: [&'a Gram; 2],
+    products: [&'a Products; 2],
     parameters: &'a Parameters,
     /// See [`Parameters::near_enough`], mm.
     near_enough: f64,
@@ -167,54 +160,38 @@ impl<'a> PatchTask<'a> {
     pub(crate) fn new(
         borders: &'a [Border; 4],
         corners: &'a [DVec3; 4],
-        grams: &'a [Gram],
+        products: &'a [Products],
         parameters: &'a Parameters,
         near_enough: f64,
     ) -> Self {
-        let grams = [0, 1].map(|k| &grams[borders[k].spans.ilog2() as usize]);
-        Self { borders, corners, grams, parameters, near_enough }
+        let products = [0, 1].map(|k| &products[borders[k].spans.ilog2() as usize]);
+        Self { borders, corners, products, parameters, near_enough }
+    }
+
+    /// The weight of the bending energy.
+    pub(crate) fn bending(&self) -> f64 {
+        1.0 - self.parameters.lambda
     }
 
     /// A fit to the samples where they are, which move to their foot points on it.
-    pub(crate) fn fit(&self, samples: &mut PatchSamples, factor: f64) -> Option<Net> {
-        let net = fit_patch(samples, self.borders, self.grams, factor * (1.0 - self.parameters.lambda))?;
+    pub(crate) fn fit(&self, samples: &mut PatchSamples) -> Option<Net> {
+        let net = fit_patch(samples, self.borders, self.products, &Stiffness::even(self.bending()))?;
         crate::foot_points::correct(samples, |u, v| net.evaluate(u, v));
         Some(net)
     }
 
-    /// A fit, and fits to the foot points on the one before, with `factor` on the bending energy; until it is near enough. Fits that
-    /// went on took a third of the time of all fits, and changed the largest deviation of no part by more than 1e-4 of the diagonal
-    /// (crossings of bridge 64 and 79, cantilever-four 76 and 26 with and without them).
-    fn attempt(&self, samples: &mut PatchSamples, factor: f64) -> Option<Net> {
-        let bending = factor * (1.0 - self.parameters.lambda);
-        let mut net = fit_patch(samples, self.borders, self.grams, bending)?;
+    /// A fit, and fits to the foot points on the one before; until it is near enough. Fits that went on took a third of the time of
+    /// all fits, and changed the largest deviation of no part by more than 1e-4 of the diagonal (crossings of bridge 64 and 79,
+    /// cantilever-four 76 and 26 with and without them).
+    pub(crate) fn attempt(&self, samples: &mut PatchSamples, stiffness: &Stiffness) -> Option<Net> {
+        let mut net = fit_patch(samples, self.borders, self.products, stiffness)?;
         for _ in 0..self.parameters.foot_point_rounds {
             if net.is_within(self.near_enough, samples) {
                 break;
             }
             crate::foot_points::correct(samples, |u, v| net.evaluate(u, v));
-            net = fit_patch(samples, self.borders, self.grams, bending)?;
+            net = fit_patch(samples, self.borders, self.products, stiffness)?;
         }
-        Some(net)
-    }
-
-    /// A fit, stiffer where the patch would fold.
-    fn unfolded(&self, samples: &mut PatchSamples) -> Option<Net> {
-        let start = places(samples);
-        let mut best: Option<(f64, Net, Vec<[f64; 2]>)> = None;
-        for factor in STIFFER {
-            put(samples, &start);
-            let net = self.attempt(samples, factor)?;
-            let folded = net.folded(self.corners, samples);
-            if best.as_ref().is_none_or(|b| folded < b.0) {
-                best = Some((folded, net, places(samples)));
-            }
-            if folded <= TIP {
-                break;
-            }
-        }
-        let (_, net, found) = best?;
-        put(samples, &found);
         Some(net)
     }
 }

@@ -10,8 +10,9 @@
 
 use crate::SplineFitError;
 use crate::patch_fit::Net;
-use crate::patches::{APART, Fitted, PatchTask, Patches, TIP, grams, places, put};
+use crate::patches::{APART, Fitted, PatchTask, Patches, places, products, put};
 use crate::samples::PatchSamples;
+use crate::unfolding::TIP;
 use rayon::prelude::*;
 use topipe_mesh::DVec3;
 
@@ -33,13 +34,14 @@ impl Patches<'_> {
     ) -> Result<(), SplineFitError> {
         let tolerance = self.parameters.largest_distance(&self.setting.layout.part.mesh);
         let near_enough = self.parameters.near_enough(&self.setting.layout.part.mesh);
-        let grams = grams(fitted.iter().map(|f| &f.borders));
+        let products = products(fitted.iter().map(|f| &f.borders));
         fitted.par_iter_mut().zip(samples).with_max_len(APART).try_for_each(|(fitted, samples)| {
             self.progress.check()?;
             if fitted.farthest <= tolerance {
                 return Ok(());
             }
-            let task = PatchTask::new(&fitted.borders, &fitted.corners, &grams, self.parameters, near_enough);
+            let task =
+                PatchTask::new(&fitted.borders, &fitted.corners, &products, self.parameters, near_enough);
             if let Some(nearer) = nearer(&task, &fitted.net, samples, tolerance) {
                 fitted.net = nearer;
             }
@@ -72,7 +74,7 @@ fn nearer(task: &PatchTask<'_>, net: &Net, samples: &mut PatchSamples, tolerance
             sample.weight *= (off / tolerance).clamp(1.0, growth);
         }
         put(samples, &found);
-        let Some(next) = task.fit(samples, 1.0) else { break };
+        let Some(next) = task.fit(samples) else { break };
         if next.folded(task.corners, samples) > allowed {
             growth = growth.sqrt();
             samples.samples.iter_mut().zip(before).for_each(|(sample, weight)| sample.weight = weight);
@@ -139,7 +141,7 @@ fn nearest_of([x, y, z]: &[[f64; BLOCK]; 3], p: DVec3) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::Parameters;
     use crate::hermite;
@@ -147,7 +149,7 @@ mod tests {
     use crate::samples::Sample;
 
     /// A plane with a ridge a tenth wide and a tenth high across it that ends before the borders.
-    fn ridge() -> PatchSamples {
+    pub(crate) fn ridge() -> PatchSamples {
         let n = 40;
         let samples = (0..n * n)
             .map(|k| {
@@ -162,7 +164,7 @@ mod tests {
         PatchSamples { samples, surface: Vec::new(), ball: (DVec3::new(0.5, 0.5, 0.0), 0.8), area: 1.0 }
     }
 
-    fn flat_borders(spans: usize) -> [Border; 4] {
+    pub(crate) fn flat_borders(spans: usize) -> [Border; 4] {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
         [0, 1, 2, 3].map(|k| {
             let (a, b) = (corners[k], corners[(k + 1) % 4]);
@@ -175,10 +177,10 @@ mod tests {
     #[test]
     fn a_ridge_that_least_squares_cut_off_is_reached() {
         let (borders, corners, parameters) = (flat_borders(8), [DVec3::Z; 4], Parameters::default());
-        let grams = grams([&borders].into_iter());
-        let task = PatchTask::new(&borders, &corners, &grams, &parameters, 0.01);
+        let products = products([&borders].into_iter());
+        let task = PatchTask::new(&borders, &corners, &products, &parameters, 0.01);
         let mut samples = ridge();
-        let net = task.fit(&mut samples, 1.0).unwrap();
+        let net = task.fit(&mut samples).unwrap();
         let before = net.farthest(&samples);
         assert!(before > 0.02, "cut off: {before}");
         let nearer = nearer(&task, &net, &mut samples, 0.01).unwrap();
@@ -192,10 +194,10 @@ mod tests {
     #[test]
     fn a_patch_swings_out_as_far_as_its_farthest_point_is_from_all_samples() {
         let (borders, corners, parameters) = (flat_borders(8), [DVec3::Z; 4], Parameters::default());
-        let grams = grams([&borders].into_iter());
-        let task = PatchTask::new(&borders, &corners, &grams, &parameters, 0.01);
+        let products = products([&borders].into_iter());
+        let task = PatchTask::new(&borders, &corners, &products, &parameters, 0.01);
         let mut samples = ridge();
-        let net = task.fit(&mut samples, 1.0).unwrap();
+        let net = task.fit(&mut samples).unwrap();
         for count in [1, 5, 33, samples.samples.len()] {
             samples = PatchSamples { samples: ridge().samples[..count].to_vec(), ..samples };
             let n = net.basis_u.len();
@@ -215,10 +217,10 @@ mod tests {
     #[test]
     fn a_patch_within_the_tolerance_stays() {
         let (borders, corners, parameters) = (flat_borders(8), [DVec3::Z; 4], Parameters::default());
-        let grams = grams([&borders].into_iter());
-        let task = PatchTask::new(&borders, &corners, &grams, &parameters, 0.01);
+        let products = products([&borders].into_iter());
+        let task = PatchTask::new(&borders, &corners, &products, &parameters, 0.01);
         let mut samples = ridge();
-        let net = task.fit(&mut samples, 1.0).unwrap();
+        let net = task.fit(&mut samples).unwrap();
         assert!(nearer(&task, &net, &mut samples, 0.2).is_none());
     }
 }
