@@ -32,43 +32,49 @@ pub(crate) fn factors(refiner: &Refiner, region: &[RegionId], spacing: f64, angl
     let centers: Vec<DVec3> =
         mesh.faces().map(|f| mesh.corners(f).into_iter().sum::<DVec3>() / 3.0).collect();
     let free = |f: usize| !region[f].is_some();
-    // Neighbours across edges that are not sharp.
-    let beside: Vec<[Option<usize>; 3]> = (0..count)
+    // Neighbours across edges that are not sharp; for others a face after the last one, which has no normal.
+    let none = count as u32;
+    let beside: Vec<[u32; 3]> = (0..count)
+        .into_par_iter()
         .map(|f| {
             [0, 1, 2].map(|k| {
                 let h = HalfEdgeId::of(FaceId::new(f), k);
-                let g = refiner.twin(h).face().index();
-                (free(f) && free(g) && refiner.feature(refiner.origin(h), refiner.target(h)).is_none())
-                    .then_some(g)
+                let g = refiner.twin(h).face();
+                let smooth = free(f)
+                    && free(g.index())
+                    && refiner.feature(refiner.origin(h), refiner.target(h)).is_none();
+                if smooth { g.0 } else { none }
             })
         })
         .collect();
+    let neighbors = |f: usize| beside[f].into_iter().filter(|&g| g != none).map(|g| g as usize);
     // Each round adds three quarters of the squared distance of neighbours to the variance.
     let (sum, pairs) = (0..count)
-        .flat_map(|f| beside[f].iter().flatten().map(move |&g| (f, g)))
+        .flat_map(|f| neighbors(f).map(move |g| (f, g)))
         .fold((0.0, 0usize), |(sum, pairs), (f, g)| {
             (sum + centers[f].distance_squared(centers[g]), pairs + 1)
         });
     let step = 0.75 * sum / pairs.max(1) as f64;
     let wanted = ((REACH * spacing).powi(2) / step.max(f64::MIN_POSITIVE)).ceil();
     let rounds = (wanted as usize).clamp(ROUNDS, MOST_ROUNDS);
-    let mut normals: Vec<DVec3> = mesh.faces().map(|f| mesh.area_vector(f)).collect();
+    let mut normals: Vec<DVec3> = mesh.faces().map(|f| mesh.area_vector(f)).chain([DVec3::ZERO]).collect();
+    // Two arrays by turns: on a fine mesh the pages of new ones cost more than the sums.
+    let mut averaged = vec![DVec3::ZERO; count + 1];
     for _ in 0..rounds {
-        normals = (0..count)
-            .into_par_iter()
-            .map(|f| normals[f] + beside[f].iter().flatten().map(|&g| normals[g]).sum::<DVec3>())
-            .map(|n| n / 4.0)
-            .collect();
+        averaged[..count].par_iter_mut().zip(&normals).zip(&beside).for_each(|((averaged, own), beside)| {
+            *averaged = (own + beside.map(|g| normals[g as usize]).into_iter().sum::<DVec3>()) / 4.0;
+        });
+        std::mem::swap(&mut normals, &mut averaged);
     }
     let mut factors: Vec<f64> = (0..count)
         .map(|f| {
-            let turn = |&g: &usize| {
+            let turn = |g: usize| {
                 let (a, b) = (normals[f], normals[g]);
                 let distance = centers[f].distance(centers[g]);
                 if distance > 0.0 { a.cross(b).length().atan2(a.dot(b)) / distance } else { 0.0 }
             };
             // The mean over the edges: thin faces are near their neighbours, and so their quotients are uncertain.
-            let turns: Vec<f64> = beside[f].iter().flatten().map(turn).collect();
+            let turns: Vec<f64> = neighbors(f).map(turn).collect();
             let mean = turns.iter().sum::<f64>() / turns.len().max(1) as f64;
             (angle / (mean * spacing).max(f64::MIN_POSITIVE)).clamp(LEAST, 1.0)
         })
@@ -80,7 +86,7 @@ pub(crate) fn factors(refiner: &Refiner, region: &[RegionId], spacing: f64, angl
         if bits != factors[f].to_bits() {
             continue;
         }
-        for g in beside[f].iter().flatten().copied() {
+        for g in neighbors(f) {
             let limit = factors[f] + GRADE * centers[f].distance(centers[g]) / spacing;
             if limit < factors[g] {
                 factors[g] = limit;
