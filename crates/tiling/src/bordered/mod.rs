@@ -12,6 +12,7 @@
 //! - Farthest-point sites fill the rest ([`sites`]).
 //! - Tiles that violate a condition get more sites ([`repair`]), and at last are cut to pieces ([`pieces`]).
 
+mod averaging;
 mod barriers;
 mod check;
 mod growth;

@@ -5,6 +5,7 @@
 //! first, or the noise of the mesh would pass for curvature; edges that are features do not count, nor do faces that
 //! are no tile's. Sizes then grow by at most [`GRADE`] of the distance, so that neighbouring tiles differ little.
 
+use super::averaging::averaged;
 use rayon::prelude::*;
 use topipe_mesh::refine::Refiner;
 use topipe_mesh::{DVec3, FaceId, HalfEdgeId, RegionId};
@@ -15,8 +16,8 @@ const ROUNDS: usize = 4;
 /// of a finer mesh makes no smaller tiles. Four rounds reach farther on eight of the nine examples; the bracket divided to
 /// 300,000 triangles has 1,368 tiles with it and 1,839 with four rounds.
 const REACH: f64 = 0.065;
-/// Most rounds: those of the bracket with 2.5 million triangles.
-const MOST_ROUNDS: usize = 400;
+/// Most rounds: those of the bracket with 25 million triangles.
+const MOST_ROUNDS: usize = 4000;
 
 /// How fast sizes may grow with the distance.
 const GRADE: f64 = 0.5;
@@ -32,7 +33,7 @@ pub(crate) fn factors(refiner: &Refiner, region: &[RegionId], spacing: f64, angl
     let centers: Vec<DVec3> =
         mesh.faces().map(|f| mesh.corners(f).into_iter().sum::<DVec3>() / 3.0).collect();
     let free = |f: usize| !region[f].is_some();
-    // Neighbours across edges that are not sharp; for others a face after the last one, which has no normal.
+    // Neighbours across edges that are not sharp; for others the number after the last face.
     let none = count as u32;
     let beside: Vec<[u32; 3]> = (0..count)
         .into_par_iter()
@@ -57,16 +58,7 @@ pub(crate) fn factors(refiner: &Refiner, region: &[RegionId], spacing: f64, angl
     let step = 0.75 * sum / pairs.max(1) as f64;
     let wanted = ((REACH * spacing).powi(2) / step.max(f64::MIN_POSITIVE)).ceil();
     let rounds = (wanted as usize).clamp(ROUNDS, MOST_ROUNDS);
-    let mut normals: Vec<DVec3> = mesh.faces().map(|f| mesh.area_vector(f)).chain([DVec3::ZERO]).collect();
-    // Two arrays by turns, not a new one each round: with short lists of neighbours that takes half off the time of the whole tiling
-    // at three million triangles.
-    let mut averaged = vec![DVec3::ZERO; count + 1];
-    for _ in 0..rounds {
-        averaged[..count].par_iter_mut().zip(&normals).zip(&beside).for_each(|((averaged, own), beside)| {
-            *averaged = (own + beside.map(|g| normals[g as usize]).into_iter().sum::<DVec3>()) / 4.0;
-        });
-        std::mem::swap(&mut normals, &mut averaged);
-    }
+    let normals = averaged(mesh.faces().map(|f| mesh.area_vector(f)).collect(), &beside, rounds);
     let mut factors: Vec<f64> = (0..count)
         .map(|f| {
             let turn = |g: usize| {
