@@ -24,17 +24,31 @@ pub(super) fn curve(a: &RegionShape, b: &RegionShape, path: &[DVec3], tolerance:
     };
     // The polyline of the mesh has chords: a curve that belongs to it is never farther away than its pieces are long.
     let longest = path.windows(2).map(|w| w[0].distance(w[1])).fold(0.0, f64::max);
-    curve.filter(|curve| path.iter().all(|&p| distance(curve, p) <= longest))
+    curve.filter(|curve| {
+        let polyline = polyline(curve);
+        path.iter().all(|&p| distance(&polyline, p) <= longest)
+    })
 }
 
-/// Distance of `p` from the nearest of a few points of the curve.
-fn distance((basis, control, _): &Curve, p: DVec3) -> f64 {
-    let samples = 16 * basis.breaks().len();
+/// Points of the curve between which it is straight enough: its ends, and fifteen within each polynomial piece.
+fn polyline((basis, control, _): &Curve) -> Vec<DVec3> {
+    let samples = 16 * (basis.breaks().len() - 1);
     let at = |t: f64| {
         let local = basis.evaluate(t);
         (0..local.count).map(|k| local.derivatives[0][k] * control[local.first + k]).sum::<DVec3>()
     };
-    (0..=samples).map(|k| at(k as f64 / samples as f64).distance(p)).fold(f64::INFINITY, f64::min)
+    (0..=samples).map(|k| at(k as f64 / samples as f64)).collect()
+}
+
+/// Distance of `p` from the nearest segment of a polyline: from its vertices alone, a mesh with pieces shorter than theirs
+/// would be far away.
+fn distance(polyline: &[DVec3], p: DVec3) -> f64 {
+    let from = |w: &[DVec3]| {
+        let along = w[1] - w[0];
+        let t = (p - w[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
+        p.distance(w[0] + t.clamp(0.0, 1.0) * along)
+    };
+    polyline.windows(2).map(from).fold(f64::INFINITY, f64::min)
 }
 
 /// The segment between the ends of `path`.
@@ -166,4 +180,35 @@ fn general(a: &RegionShape, b: &RegionShape, path: &[DVec3], tolerance: f64) -> 
         spans *= 2;
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// However fine the mesh: its vertices lie between the points at which a curve is compared with them.
+    #[test]
+    fn fine_paths_belong_to_the_curve_as_coarse_ones_do() {
+        let plane = |normal| RegionShape::Plane { point: DVec3::ZERO, normal };
+        let rod = RegionShape::Cylinder { point: DVec3::ZERO, axis: DVec3::Z, radius: 2.0, hole: false };
+        for pieces in [4, 40, 4000] {
+            let at = |k: i32| f64::from(k) / f64::from(pieces);
+            let straight: Vec<DVec3> = (0..=pieces).map(|k| 3.0 * DVec3::X * at(k)).collect();
+            let (.., shape) = curve(&plane(DVec3::Y), &plane(DVec3::Z), &straight, 1e-7).unwrap();
+            assert!(matches!(shape, CurveShape::Line), "{pieces} pieces");
+            let round: Vec<DVec3> =
+                (0..=pieces).map(|k| 2.0 * DVec3::new(at(k).cos(), at(k).sin(), 0.0)).collect();
+            let (.., shape) = curve(&plane(DVec3::Z), &rod, &round, 1e-7).unwrap();
+            assert!(matches!(shape, CurveShape::Arc { .. }), "{pieces} pieces");
+        }
+    }
+
+    /// A path that leaves the line by more than its own pieces belongs to another curve.
+    #[test]
+    fn a_path_that_goes_elsewhere_has_no_curve() {
+        let plane = |normal| RegionShape::Plane { point: DVec3::ZERO, normal };
+        let bow: Vec<DVec3> =
+            (0..=40).map(|k| f64::from(k) / 40.0).map(|t| DVec3::new(3.0 * t, t * (1.0 - t), 0.0)).collect();
+        assert!(curve(&plane(DVec3::Y), &plane(DVec3::Z), &bow, 1e-7).is_none());
+    }
 }
