@@ -7,6 +7,14 @@ const FREE: f64 = 0.52; // 30 degrees
 /// Corners this far from a right angle are next to the gates of 15 and 165 degrees.
 const STEEP: f64 = 1.13; // 65 degrees
 
+/// Narrowest and widest corner that a patch may have, radians: the gates of 15 and 165 degrees.
+pub(crate) const GATES: [f64; 2] = [0.262, 2.879];
+
+/// Whether a patch may have a corner of this angle.
+pub(crate) fn within_gates(angle: f64) -> bool {
+    (GATES[0]..=GATES[1]).contains(&angle)
+}
+
 /// What an angle at a corner costs.
 pub(crate) fn corner(angle: f64) -> f64 {
     let off = (angle - FRAC_PI_2).abs();

@@ -6,12 +6,10 @@
 //! far side is a border.
 
 use crate::Side;
-use crate::cost::corner;
+use crate::cost::{GATES, corner, within_gates};
 use crate::refine::Regions;
 use topipe_mesh::{FaceId, VertexId};
 
-/// Narrowest and widest corner that is left as it is, radians: the gates of 15 and 165 degrees.
-const GATES: [f64; 2] = [0.262, 2.879];
 /// Where on the far side of the face the point is put, from the old path on.
 const SHARES: [f64; 3] = [0.25, 0.5, 0.75];
 /// How far towards a far side that is a border the point lies.
@@ -51,7 +49,7 @@ fn turn_corner(regions: &mut Regions, beside: &[Vec<u32>], r: usize, k: usize) -
     let (out, into) = (sides[k], sides[(k + sides.len() - 1) % sides.len()]);
     let start = |side: Side| regions.edges[side.edge as usize].ends[side.reversed as usize];
     let angle = regions.tiled.corner_angle(regions.vertices[start(out) as usize], r as u32);
-    if (GATES[0]..=GATES[1]).contains(&angle) {
+    if within_gates(angle) {
         return false;
     }
     [(out, out.reversed), (into, !into.reversed)].into_iter().any(|(side, last)| {

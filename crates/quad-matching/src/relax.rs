@@ -8,7 +8,7 @@
 mod star;
 
 use crate::QuadMatchingError;
-use crate::cost::corner;
+use crate::cost::{self, corner};
 use crate::disk::{Cuts, Disk, Numbers};
 use crate::pairing::face_angle;
 use crate::refine::Regions;
@@ -120,16 +120,36 @@ fn rounds(regions: usize, incidence: &Incidence) -> Vec<Vec<Task<'_>>> {
     rounds
 }
 
-/// Sweeps over all macro-vertices; with `only_bad` only over those with a corner around them that costs something.
-/// Returns how many were moved or had their edges cut anew.
+/// Which vertices are relaxed, and how much is tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Effort {
+    /// All of them, once each: edges become straight, though corners may become a little worse.
+    Straighten,
+    /// Those beside corners that cost something, until one placement is better.
+    Improve,
+    /// Those beside corners outside the gates: of all placements the best, wherever in the star.
+    Search,
+}
+
+/// Sweeps over all macro-vertices that are worth the effort. Returns how many were moved or had their edges cut anew.
 pub(crate) fn relax(
     regions: &mut Regions,
-    only_bad: bool,
+    effort: Effort,
     snap: f64,
     progress: &Progress,
 ) -> Result<usize, QuadMatchingError> {
+    let worth: Vec<bool> = match effort {
+        Effort::Search => (0..regions.sides.len()).map(|r| !within_gates(regions, r)).collect(),
+        Effort::Straighten | Effort::Improve => vec![true; regions.sides.len()],
+    };
+    if !worth.contains(&true) {
+        return Ok(0);
+    }
     let incidence = Incidence::new(regions);
-    let rounds = rounds(regions.sides.len(), &incidence);
+    let mut rounds = rounds(regions.sides.len(), &incidence);
+    for round in &mut rounds {
+        round.retain(|(_, fan)| fan.corners.iter().any(|&(r, _)| worth[r]));
+    }
     let all: usize = rounds.iter().map(Vec::len).sum();
     let mut faces: Vec<Vec<FaceId>> = vec![Vec::new(); regions.sides.len()];
     for (f, &r) in regions.tiled.tile_of_face.iter().enumerate() {
@@ -145,7 +165,7 @@ pub(crate) fn relax(
         let found: Vec<Option<Change>> = round
             .par_iter()
             .with_max_len(APART)
-            .map(|&task| try_plans(shared, faces_now, task, only_bad, snap))
+            .map(|&task| try_plans(shared, faces_now, task, effort, snap))
             .collect();
         for change in found.into_iter().flatten() {
             change.make(regions, &mut faces);
@@ -154,6 +174,14 @@ pub(crate) fn relax(
         done += round.len();
     }
     Ok(changed)
+}
+
+/// Whether all corners of a region are within the gates.
+fn within_gates(regions: &Regions, r: usize) -> bool {
+    regions.sides[r].iter().all(|side| {
+        let start = regions.edges[side.edge as usize].ends[side.reversed as usize];
+        cost::within_gates(regions.tiled.corner_angle(regions.vertices[start as usize], r as u32))
+    })
 }
 
 /// Stars given to a thread together.
@@ -195,39 +223,64 @@ fn try_plans<'a>(
     regions: &Regions,
     faces: &[Vec<FaceId>],
     (v, fan): Task<'a>,
-    only_bad: bool,
+    effort: Effort,
     snap: f64,
 ) -> Option<Change<'a>> {
     let (mut star, now) = Numbers::with(|numbers| Star::new(regions, faces, (v, fan), numbers))?;
     let before = star.cost(&now, f64::INFINITY);
-    if only_bad && before <= 0.0 {
+    let worth = match effort {
+        Effort::Straighten => true,
+        Effort::Improve => before > 0.0,
+        Effort::Search => !star.within_gates(&now),
+    };
+    if !worth {
         return None;
     }
-    let allowed = before + if only_bad { -1e-9 } else { PATIENCE };
-    let mut attempt = |plan: Plan, goal: DVec2| {
+    let better = before - 1e-9;
+    let mut attempt = |plan: Plan, goal: DVec2, allowed: f64| {
         let spread = relax_one(&mut star, (plan, goal), allowed, snap);
         if spread.is_none() {
             star.disk.heal();
         }
         spread
     };
-    let spread = if only_bad {
-        PLANS.into_iter().find_map(|plan| attempt(plan, DVec2::ZERO)).or_else(|| {
-            // Near the gates it is worth to look around: on a coarse mesh a step aside may meet better faces.
-            let around = if before > BAD && fan.closed { 6 } else { 0 };
-            (0..around).find_map(|k| {
-                let goal = 0.35 * DVec2::from_angle(TAU * f64::from(k) / 6.0);
-                attempt(Plan::Equal, goal).or_else(|| attempt(Plan::Length, goal))
+    let around = |radius: f64, count: u32| {
+        (0..count).map(move |k| radius * DVec2::from_angle(TAU * f64::from(k) / f64::from(count)))
+    };
+    let spread = match effort {
+        Effort::Straighten => attempt(Plan::Equal, DVec2::ZERO, before + PATIENCE),
+        Effort::Improve => {
+            PLANS.into_iter().find_map(|plan| attempt(plan, DVec2::ZERO, better)).or_else(|| {
+                // Near the gates it is worth to look around: on a coarse mesh a step aside may meet better faces.
+                let count = if before > BAD && fan.closed { 6 } else { 0 };
+                around(0.35, count).find_map(|goal| {
+                    attempt(Plan::Equal, goal, better).or_else(|| attempt(Plan::Length, goal, better))
+                })
             })
-        })
-    } else {
-        attempt(Plan::Equal, DVec2::ZERO)
+        }
+        Effort::Search => {
+            let radii = if fan.closed { &SEARCHED[..] } else { &[] };
+            let goals = radii.iter().flat_map(|&radius| around(radius, 12));
+            let goals: Vec<DVec2> = std::iter::once(DVec2::ZERO).chain(goals).collect();
+            let mut best = None;
+            let mut allowed = better;
+            for placement in goals.into_iter().flat_map(|goal| PLANS.map(|plan| (plan, goal))) {
+                if let Some(spread) = relax_one(&mut star, placement, allowed, snap) {
+                    allowed = star.cost(&spread, f64::INFINITY) - 1e-9;
+                    best = Some((placement, allowed + 2e-9));
+                }
+                star.disk.heal();
+            }
+            best.and_then(|(placement, allowed)| relax_one(&mut star, placement, allowed, snap))
+        }
     }?;
     Some(Change { v, fan, spokes: star.spokes, cuts: star.disk.into_cuts(), spread })
 }
 
 /// The cost of a star with a corner outside the gates is about this at least.
 const BAD: f64 = 3.0;
+/// Distances from the centre of the disk at which a vertex is searched a better place for.
+const SEARCHED: [f64; 4] = [0.15, 0.3, 0.45, 0.6];
 
 /// The path along a side of a region in its direction.
 fn path(regions: &Regions, (r, k): Corner) -> Vec<VertexId> {

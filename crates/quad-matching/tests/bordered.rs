@@ -105,6 +105,23 @@ fn regions_are_faces_and_features_are_followed() {
     }
 }
 
+/// Tilings on which relaxation alone leaves corners of 11 to 15 degrees around centres of eight or nine sides, and of 183 degrees
+/// where a border turns back at the middle of an edge.
+#[test]
+fn corners_outside_the_gates_are_searched_better_places_for() {
+    for (name, size, bend) in [
+        ("bridge", 1.01, 1.0),
+        ("support", 1.03, 1.0),
+        ("support", 1.0, 0.95),
+        ("cantilever-four", 1.0, 1.15),
+    ] {
+        let mut parameters = tiling_parameters();
+        parameters.tile_size *= size;
+        parameters.bend *= bend;
+        assert_eq!(irregular(&laid_out(&tiled(&smoothed(name), &parameters))), 0, "{name} {size} {bend}");
+    }
+}
+
 /// Where a region comes to a point, two quads lie below it: one with both sides of the point would have the same triangle in its
 /// corner as the region, in a coarse mesh of the solid.
 #[test]

@@ -4,7 +4,7 @@
 //! map, which differ between attempts in the places of the border alone. Vertices have the numbers of the copy.
 
 use super::{Corner, Fan, PLANS, Plan, Task, path};
-use crate::cost::{corner, taper};
+use crate::cost::{corner, taper, within_gates};
 use crate::disk::{Disk, Numbers};
 use crate::pairing::face_angle;
 use crate::refine::Regions;
@@ -125,22 +125,38 @@ impl<'a> Star<'a> {
         Some((star, Spread { site: vertex, paths, labels }))
     }
 
+    /// The angle at a vertex within a region of the star.
+    fn angle(&self, spread: &Spread, v: VertexId, label: usize) -> f64 {
+        let own = self.disk.around(v).filter(|h| spread.labels[h.face().index()] as usize == label);
+        own.map(|h| face_angle(self.disk.mesh(), h)).sum()
+    }
+
+    /// The edge before corner `i`, which is a feature at the beginning of an open fan, and at its end.
+    fn spoke<'s>(&'s self, spread: &'s Spread, i: usize) -> &'s [VertexId] {
+        match self.fan.closed {
+            true => &spread.paths[i % self.fan.corners.len()],
+            false if i == 0 => &self.beside[0],
+            false => spread.paths.get(i - 1).unwrap_or(&self.beside[1]),
+        }
+    }
+
+    /// Whether all corners at the vertex are within the gates, and those at the far ends of its edges.
+    pub(super) fn within_gates(&self, spread: &Spread) -> bool {
+        let n = self.fan.corners.len();
+        (0..n).all(|i| {
+            let ends = [i, i + 1].map(|k| self.spoke(spread, k)[self.spoke(spread, k).len() - 1]);
+            [spread.site, ends[0], ends[1]].into_iter().all(|v| within_gates(self.angle(spread, v, i)))
+        })
+    }
+
     /// The cost of the corners that edges from a vertex have to do with: those at the vertex, and at the far ends of the
     /// edges on either hand; and of the quads around it. Not all of it where that is more than `limit` already: no part is
     /// negative.
     pub(super) fn cost(&self, spread: &Spread, limit: f64) -> f64 {
         let mesh = self.disk.mesh();
-        let at = |v: VertexId, label: usize| {
-            let own = self.disk.around(v).filter(|h| spread.labels[h.face().index()] as usize == label);
-            corner(own.map(|h| face_angle(mesh, h)).sum())
-        };
+        let at = |v: VertexId, label: usize| corner(self.angle(spread, v, label));
+        let spoke = |i: usize| self.spoke(spread, i);
         let n = self.fan.corners.len();
-        // The edge before corner `i`, which is a feature at the beginning of an open fan, and at its end.
-        let spoke = |i: usize| match self.fan.closed {
-            true => &spread.paths[i % n],
-            false if i == 0 => &self.beside[0],
-            false => spread.paths.get(i - 1).unwrap_or(&self.beside[1]),
-        };
         let mut sum = 0.0;
         let mut before = length(mesh, spoke(0));
         for i in 0..n {
