@@ -211,9 +211,10 @@ fn frame(
             let across = a.cross(b);
             let rough = fit(Known::Point).normal;
             let normal = across.normalize_or_zero();
-            // Nearly parallel directions fix the plane too, but where noise turns it away from the mesh, and there is no
-            // edge between them to become a crease, the mesh's own is taken.
-            if across.length() > CORNER || across.length() > LEAVES && normal.dot(rough).abs() >= FAR {
+            // Nearly parallel directions fix the plane too: two patches between them have no other in common. Where there is
+            // one, and noise turns the plane away from the mesh, the mesh's own is taken.
+            let seen = sector.quads.len() > 1 || normal.dot(rough).abs() >= FAR;
+            if across.length() > CORNER || across.length() > LEAVES && seen {
                 Known::Normal(if normal.dot(rough) < 0.0 { -normal } else { normal })
             } else {
                 // One curve that passes through, in opposite directions, or two that leave side by side.

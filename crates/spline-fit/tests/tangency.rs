@@ -79,6 +79,16 @@ fn patches_of_a_real_part_meet_with_a_common_tangent_plane() {
     assert_eq!(topipe_mesh::spatial::crossings(&mesh).len(), 0);
 }
 
+/// At a border of support that bends by a few degrees the mesh does not say where the tangent plane is: there is only one that two
+/// patches can have in common.
+#[test]
+fn patches_beside_a_bent_border_have_a_common_tangent_plane() {
+    let surface =
+        fit(&common::fixture("support"), &Parameters::default(), &Units::none(), &Progress::silent())
+            .unwrap();
+    assert!(largest_jump(&surface) < 0.1, "{} degrees", largest_jump(&surface));
+}
+
 #[test]
 fn patches_on_a_torus_meet_with_a_common_tangent_plane() {
     // A mesh with eleven degrees from facet to facet: the normals are those of a smooth surface all the same.
