@@ -14,7 +14,7 @@ use topipe_tiling::Tiling;
 /// Rounds in which vertices beside bad corners are relaxed.
 const RELAXATION_ROUNDS: u32 = 3;
 /// Most rounds in which better places are searched for vertices beside corners that are outside the gates still. None of the nine
-/// examples has any; of 108 tilings of them with other sizes of tiles and other bends 14 had one to five, with the search three
+/// examples has any; of 108 tilings of them with other sizes of tiles and other bends 14 had one to five, with the search two
 /// had one or two.
 const SEARCH_ROUNDS: u32 = 4;
 
