@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn the_middle_of_a_border_is_a_vertex_where_it_is_nearly_straight() {
-        let (mut tiled, mut path) = notched(2.0);
+        let (mut tiled, mut path) = notched(20.0);
         assert_eq!(middle_on_feature(&mut tiled, &mut path, 0.3, &[0]), 1);
         assert_eq!(path, [1, 0, 5].map(VertexId));
     }
