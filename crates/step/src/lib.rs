@@ -146,6 +146,14 @@ impl<'a, W: Write> Entities<'a, W> {
         if let Some(&id) = self.points.get(&key) {
             return Ok(id);
         }
+        let id = self.single_point(p)?;
+        self.points.insert(key, id);
+        Ok(id)
+    }
+
+    /// A point that nothing else will ask for, as the inner control points of a surface: an entity of its own, which is not
+    /// remembered. They are most of the points of a file.
+    pub fn single_point(&mut self, p: DVec3) -> io::Result<u64> {
         let id = self.next;
         self.next += 1;
         let line = &mut self.line;
@@ -159,7 +167,6 @@ impl<'a, W: Write> Entities<'a, W> {
         }
         line.push_str("));\n");
         self.out.write_all(line.as_bytes())?;
-        self.points.insert(key, id);
         Ok(id)
     }
 
@@ -236,7 +243,10 @@ mod tests {
         let mut bytes = Vec::new();
         let mut file = Entities::begin(&mut bytes, &product).unwrap();
         let axes = file.placement(DVec3::ZERO, DVec3::Z, DVec3::X).unwrap();
-        assert_eq!(file.point(DVec3::ONE).unwrap(), file.point(DVec3::ONE).unwrap());
+        let point = file.point(DVec3::ONE).unwrap();
+        let single = file.single_point(DVec3::ONE).unwrap();
+        assert_eq!(file.point(DVec3::ONE).unwrap(), point);
+        assert_ne!(single, point);
         let [outer, cavity] = [1, 2].map(|face| file.closed_shell(&[face]).unwrap());
         let plain = file.solid(outer, &[]).unwrap();
         let hollow = file.solid(outer, &[cavity]).unwrap();
@@ -262,7 +272,7 @@ mod tests {
         assert!(text.starts_with("ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(('what it is'),'2;1');\n"));
         assert!(text.ends_with(";\nENDSEC;\nEND-ISO-10303-21;\n"));
         assert!(text.contains("PRODUCT('a ''b''','a ''b''',''"));
-        assert_eq!(text.matches("CARTESIAN_POINT").count(), 2);
+        assert_eq!(text.matches("CARTESIAN_POINT").count(), 3);
         assert_eq!(
             (text.matches("MANIFOLD_SOLID_BREP").count(), text.matches("BREP_WITH_VOIDS").count()),
             (1, 1)

@@ -121,8 +121,10 @@ fn curve<W: Write>(file: &mut Entities<'_, W>, edge: &EdgeCurve) -> io::Result<u
 fn spline_surface<W: Write>(file: &mut Entities<'_, W>, patch: &Patch) -> io::Result<u64> {
     let (nu, nv) = (patch.basis_u.len(), patch.basis_v.len());
     let mut net = Vec::with_capacity(nu * nv);
-    for &p in &patch.control {
-        net.push(file.point(p)?);
+    for (k, &p) in patch.control.iter().enumerate() {
+        let (i, j) = (k % nu, k / nu);
+        let on_border = i == 0 || j == 0 || i + 1 == nu || j + 1 == nv;
+        net.push(if on_border { file.point(p) } else { file.single_point(p) }?);
     }
     // STEP lists the net with v fastest.
     let columns: Vec<String> =
