@@ -7,7 +7,7 @@
 //! Crossings of the surface triangulated to 2e-3 of the diagonal (pairs) without and with it: cantilever-four 642 and 9, bell-crank 186 and 9,
 //! beam-two-holes 7 and 0; on the others at most six fewer.
 
-use crate::patches::Fitted;
+use crate::patches::{APART, Fitted};
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
 use rayon::prelude::*;
@@ -130,8 +130,12 @@ impl Around {
 
     /// The share of each patch that is turned over; 0 for those not looked at.
     fn folded(&self, fitted: &[Fitted], samples: &[PatchSamples]) -> Vec<f64> {
-        let share = |quad: usize| fitted[quad].net.folded(&fitted[quad].corners, &samples[quad]);
-        (0..fitted.len()).into_par_iter().map(|q| if self.looked_at[q] { share(q) } else { 0.0 }).collect()
+        let share = |&quad: &usize| fitted[quad].net.folded(&fitted[quad].corners, &samples[quad]);
+        let looked_at: Vec<usize> = (0..fitted.len()).filter(|&quad| self.looked_at[quad]).collect();
+        let mut folded = vec![0.0; fitted.len()];
+        let shares: Vec<f64> = looked_at.par_iter().with_max_len(APART).map(share).collect();
+        looked_at.iter().zip(shares).for_each(|(&quad, share)| folded[quad] = share);
+        folded
     }
 
     /// How much the patches around the ends of an edge are folded together.

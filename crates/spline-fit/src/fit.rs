@@ -2,6 +2,7 @@
 
 use crate::parameters::Continuity;
 use crate::samples::{PatchSamples, faces_by_quad, sample};
+use crate::setting::Setting;
 use crate::{Parameters, SplineFitError, SplineSurface};
 use rayon::prelude::*;
 use topipe_progress::{Progress, UnitKey, Units};
@@ -16,10 +17,14 @@ pub fn fit(
     units: &Units,
     progress: &Progress,
 ) -> Result<SplineSurface, SplineFitError> {
-    let samples = samples(layout, parameters)?;
     match parameters.continuity {
-        Continuity::Position => crate::position_fit::fit(layout, samples, parameters, progress),
-        Continuity::Tangent => crate::tangent_fit::fit(layout, samples, parameters, units, progress),
+        Continuity::Position => {
+            crate::position_fit::fit(layout, samples(layout, parameters)?, parameters, progress)
+        }
+        Continuity::Tangent => {
+            let (setting, samples) = tangent_setting(layout, parameters)?;
+            crate::tangent_fit::fit(setting, samples, parameters, units, progress)
+        }
     }
 }
 
@@ -29,9 +34,23 @@ pub fn first_patches(layout: &QuadLayout, parameters: &Parameters) -> Result<Vec
     match parameters.continuity {
         Continuity::Position => Ok(Vec::new()),
         Continuity::Tangent => {
-            crate::tangent_fit::first_patches(layout, &samples(layout, parameters)?, parameters)
+            let (setting, samples) = tangent_setting(layout, parameters)?;
+            crate::tangent_fit::first_patches(setting, &samples, parameters)
         }
     }
+}
+
+/// What the fit with common tangents begins with. Few threads can work on the setting; the others take samples meanwhile.
+fn tangent_setting<'a>(
+    layout: &'a QuadLayout,
+    parameters: &Parameters,
+) -> Result<(Setting<'a>, Vec<PatchSamples>), SplineFitError> {
+    parameters.basis()?;
+    check(layout)?;
+    let (setting, samples) = rayon::join(|| Setting::new(layout), || samples(layout, parameters));
+    // The error of the samples first, as if they had been taken first.
+    let samples = samples?;
+    Ok((setting?, samples))
 }
 
 fn samples(layout: &QuadLayout, parameters: &Parameters) -> Result<Vec<PatchSamples>, SplineFitError> {

@@ -6,12 +6,13 @@ use crate::fans::{EdgeRole, Spoke};
 use crate::frames::{Frames, KnownFrame, crease_tangents};
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
-use crate::smooth_curves::{InnerFits, SmoothCurve, smooth_curve};
+use crate::smooth_curves::{KnownEdge, SmoothCurve, smooth_curve};
 use crate::twist::{Leg, leg, turning};
 use rayon::prelude::*;
 use topipe_mesh::DVec3;
 
 /// A curve and, where patches have tangent planes along it, its normals.
+#[derive(PartialEq)]
 pub(crate) struct Curve {
     pub(crate) control: Vec<DVec3>,
     /// Control points of the normals over the same basis.
@@ -25,11 +26,11 @@ impl Curve {
     }
 }
 
-/// Local fits that another network of the same setting has made.
+/// Local fits, and curves through them, that another network of the same setting has made.
 #[derive(Debug, Default)]
 pub(crate) struct KnownFits {
     frames: Vec<KnownFrame>,
-    inner: Vec<InnerFits>,
+    edges: Vec<KnownEdge>,
 }
 
 /// Vertices and edges.
@@ -47,7 +48,7 @@ pub(crate) fn network(
     reach: &[f64],
     known: &mut KnownFits,
 ) -> Result<Network, SplineFitError> {
-    known.inner.resize_with(spans.len(), InnerFits::default);
+    known.edges.resize_with(spans.len(), KnownEdge::default);
     let layout = setting.layout;
     let given = setting.given(samples, reach);
     let singular = |e: usize| {
@@ -57,7 +58,7 @@ pub(crate) fn network(
     let tangents = crease_tangents(&given);
     let frames = Frames::new(&given, &tangents, &mut known.frames)?;
     let mut smooth: Vec<Option<SmoothCurve>> = known
-        .inner
+        .edges
         .par_iter_mut()
         .enumerate()
         .map(|(e, known)| match setting.roles[e] {
@@ -88,10 +89,11 @@ pub(crate) fn network(
     }
     let curves = smooth
         .into_par_iter()
+        .zip(&mut known.edges)
         .enumerate()
-        .map(|(e, smooth)| {
+        .map(|(e, (smooth, known))| {
             if let Some(curve) = smooth {
-                let normals = curve.normal_control();
+                let normals = known.normal_control(&curve);
                 return Some(Curve { control: curve.control, normals: Some(normals) });
             }
             if let Some(curve) = &setting.borders.curves[e] {

@@ -22,6 +22,15 @@ pub(crate) struct Fitted {
     pub(crate) net: Net,
     /// The largest distance of a sample, mm.
     pub(crate) farthest: f64,
+    /// The key it is kept under, where patches are kept.
+    key: Option<UnitKey>,
+}
+
+/// All patches, and what they were fitted to.
+pub(crate) struct Round {
+    pub(crate) network: Network,
+    spans: Vec<usize>,
+    pub(crate) fitted: Vec<Fitted>,
 }
 
 /// What all patches are fitted with.
@@ -44,26 +53,45 @@ impl Fitted {
 }
 
 impl Patches<'_> {
-    /// Borders of all patches, with at least `spans` along each edge, and normals at their corners.
-    pub(crate) fn given(&self, network: &Network, spans: &[usize]) -> (Vec<[Border; 4]>, Vec<[DVec3; 4]>) {
-        let setting = self.setting;
-        let borders = (0..setting.layout.quads.len())
+    /// The keys under which the patches of a first round are kept.
+    pub(crate) fn first_keys(&self, network: &Network, spans: &[usize]) -> Vec<UnitKey> {
+        let corners = self.corners(network);
+        (0..corners.len())
             .into_par_iter()
-            .map(|quad| borders_of(setting, quad, &network.curves, spans))
-            .collect();
-        let normal = |sector: u32| network.frames.frames[sector as usize].surface.normal;
-        (borders, setting.sectors.at.iter().map(|sectors| sectors.map(normal)).collect())
+            .map(|quad| {
+                self.key(quad, &borders_of(self.setting, quad, &network.curves, spans), &corners[quad])
+            })
+            .collect()
     }
 
-    /// The keys under which the patches are kept.
-    pub(crate) fn keys(&self, borders: &[[Border; 4]], corners: &[[DVec3; 4]]) -> Vec<UnitKey> {
+    /// The key under which a patch is kept.
+    fn key(&self, quad: usize, borders: &[Border; 4], corners: &[DVec3; 4]) -> UnitKey {
         let near_enough = self.parameters.near_enough(&self.setting.layout.part.mesh);
-        self.samples
-            .par_iter()
-            .zip(borders)
-            .zip(corners)
-            .map(|((&samples, borders), corners)| {
-                unit::key(samples, borders, corners, self.parameters, near_enough)
+        unit::key(self.samples[quad], borders, corners, self.parameters, near_enough)
+    }
+
+    /// The normals at the corners of all patches.
+    fn corners(&self, network: &Network) -> Vec<[DVec3; 4]> {
+        let normal = |sector: u32| network.frames.frames[sector as usize].surface.normal;
+        self.setting.sectors.at.iter().map(|sectors| sectors.map(normal)).collect()
+    }
+
+    /// The patches with the same curves around them, spans and corners as `before`: their borders need not be made again.
+    fn unchanged(
+        &self,
+        network: &Network,
+        spans: &[usize],
+        corners: &[[DVec3; 4]],
+        before: &Round,
+    ) -> Vec<bool> {
+        let same: Vec<bool> = (0..spans.len())
+            .into_par_iter()
+            .map(|e| spans[e] == before.spans[e] && network.curves[e] == before.network.curves[e])
+            .collect();
+        let patches = self.setting.layout.quads.iter().zip(corners.iter().zip(&before.fitted));
+        patches
+            .map(|(sides, (corners, before))| {
+                *corners == before.corners && sides.iter().all(|side| same[side.edge as usize])
             })
             .collect()
     }
@@ -73,43 +101,68 @@ impl Patches<'_> {
     pub(crate) fn fit(
         &self,
         samples: &mut [PatchSamples],
-        network: &Network,
+        network: Network,
         spans: &[usize],
-        before: Vec<Fitted>,
-    ) -> Result<Vec<Fitted>, SplineFitError> {
+        before: Option<Round>,
+    ) -> Result<Round, SplineFitError> {
         let Self { setting, parameters, units, progress, .. } = *self;
         let layout = setting.layout;
-        let (borders, corners) = self.given(network, spans);
-        let keys = if units.are_kept() { self.keys(&borders, &corners) } else { Vec::new() };
-        units.announce("patches", &keys);
-        let products = products(borders.iter());
-        let near_enough = parameters.near_enough(&layout.part.mesh);
-        let done = AtomicU64::new(0);
+        let corners = self.corners(&network);
+        let (unchanged, before) = match before {
+            Some(before) => (self.unchanged(&network, spans, &corners, &before), before.fitted),
+            None => (vec![false; samples.len()], Vec::new()),
+        };
         let mut before: Vec<Option<Fitted>> = before.into_iter().map(Some).collect();
         before.resize_with(samples.len(), || None);
-        samples
+        // None where it is the same as before.
+        let given: Vec<Option<([Border; 4], Option<UnitKey>)>> = unchanged
+            .par_iter()
+            .enumerate()
+            .map(|(quad, same)| {
+                let borders = (!same).then(|| borders_of(setting, quad, &network.curves, spans))?;
+                let key = units.are_kept().then(|| self.key(quad, &borders, &corners[quad]));
+                Some((borders, key))
+            })
+            .collect();
+        let key_of = |(given, before): (&Option<([Border; 4], Option<UnitKey>)>, &Option<Fitted>)| {
+            given.as_ref().map_or_else(|| before.as_ref().and_then(|b| b.key), |given| given.1)
+        };
+        units.announce("patches", &given.iter().zip(&before).filter_map(key_of).collect::<Vec<_>>());
+        let products = products(given.iter().flatten().map(|(borders, _)| borders));
+        let near_enough = parameters.near_enough(&layout.part.mesh);
+        let done = AtomicU64::new(0);
+        let fitted = samples
             .par_iter_mut()
             .zip(before)
-            .zip(borders.par_iter().zip(&corners))
+            .zip(given.into_par_iter().zip(corners))
             .enumerate()
             .with_max_len(APART)
-            .map(|(quad, ((samples, before), (borders, corners)))| {
+            .map(|(quad, ((samples, before), (given, corners)))| {
                 progress.check()?;
                 // Knots were inserted elsewhere; the samples are where the fit has moved them.
-                if let Some(same) = before.filter(|b| b.borders == *borders && b.corners == *corners) {
-                    return Ok(same);
-                }
+                let (borders, key) = match (given, before) {
+                    (None, Some(same)) => return Ok(same),
+                    (Some((borders, _)), Some(same))
+                        if same.borders == borders && same.corners == corners =>
+                    {
+                        return Ok(same);
+                    }
+                    (Some(given), _) => given,
+                    (None, None) => {
+                        return Err(SplineFitError::Layout(format!("quad {quad} has no borders")));
+                    }
+                };
                 // Each refinement starts from the same parameters: what a patch becomes does not depend on the way there.
                 put(samples, &self.starts[quad]);
-                let task = PatchTask::new(borders, corners, &products, parameters, near_enough);
+                let task = PatchTask::new(&borders, &corners, &products, parameters, near_enough);
                 let compute = |samples: &mut PatchSamples| {
                     task.unfolded(samples).ok_or_else(|| {
                         let at = layout.part.mesh.position(layout.vertices[layout.corners(quad)[0] as usize]);
                         SplineFitError::Singular { what: "patch", index: quad, x: at.x, y: at.y, z: at.z }
                     })
                 };
-                let net = match keys.get(quad) {
-                    Some(&key) => unit::recall(units, key, samples, borders, compute)?,
+                let net = match key {
+                    Some(key) => unit::recall(units, key, samples, &borders, compute)?,
                     None => compute(samples)?,
                 };
                 let count = done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -117,12 +170,13 @@ impl Patches<'_> {
                     progress.step(count, layout.quads.len() as u64, "patches");
                 }
                 let farthest = net.farthest(samples);
-                Ok(Fitted { borders: borders.clone(), corners: *corners, net, farthest })
+                Ok(Fitted { borders, corners, net, farthest, key })
             })
             // The first error in the order of the quads, for any number of threads.
             .collect::<Vec<Result<Fitted, SplineFitError>>>()
             .into_iter()
-            .collect()
+            .collect::<Result<_, _>>()?;
+        Ok(Round { network, spans: spans.to_vec(), fitted })
     }
 }
 

@@ -52,13 +52,14 @@ pub(crate) struct Refinement {
 }
 
 impl Refinement {
-    pub(crate) fn new(setting: &Setting<'_>, parameters: &Parameters) -> Self {
+    /// `index` is one of the mesh of the layout; without it one is built when it is needed.
+    pub(crate) fn new(setting: &Setting<'_>, parameters: &Parameters, index: Option<SurfaceIndex>) -> Self {
         Self {
             spans: vec![parameters.spans as usize; setting.layout.edges.len()],
             rounds: if parameters.refinements > 0 { parameters.refinements + LATE_ROUNDS } else { 0 },
             closer: vec![1.0; setting.layout.edges.len()],
             tolerance: parameters.largest_distance(&setting.layout.part.mesh),
-            index: None,
+            index,
             easing: Easing::default(),
         }
     }

@@ -46,40 +46,73 @@ impl SmoothCurve {
 /// The local fits at the inner breaks of an edge, which are the same for each refinement in which it has the same spans and
 /// their radius is the same.
 #[derive(Debug, Default)]
-pub(crate) struct InnerFits {
+struct InnerFits {
     spans: usize,
     reach: f64,
     surfaces: Vec<LocalSurface>,
 }
 
-/// The curve of edge `e` with `spans` spans; `beside` are its two quads. Local fits that are `known` are not made again.
+/// What a curve is made from, but for what never changes.
+#[derive(Debug, Clone, PartialEq)]
+struct CurveInput {
+    spans: usize,
+    reach: f64,
+    /// Places, surfaces and directions at the ends.
+    ends: [(DVec3, LocalSurface, DVec3); 2],
+}
+
+/// What was found for an edge before: rounds of refinement change few edges.
+#[derive(Debug, Default)]
+pub(crate) struct KnownEdge {
+    inner: InnerFits,
+    curve: Option<(CurveInput, SmoothCurve)>,
+    normals: Option<(SmoothCurve, Vec<DVec3>)>,
+}
+
+impl KnownEdge {
+    /// [`SmoothCurve::normal_control`], found once.
+    pub(crate) fn normal_control(&mut self, curve: &SmoothCurve) -> Vec<DVec3> {
+        match &self.normals {
+            Some((same, normals)) if same == curve => normals.clone(),
+            _ => {
+                let normals = curve.normal_control();
+                self.normals = Some((curve.clone(), normals.clone()));
+                normals
+            }
+        }
+    }
+}
+
+/// The curve of edge `e` with `spans` spans; `beside` are its two quads. What is `known` is not made again.
 pub(crate) fn smooth_curve(
     given: &Given<'_>,
     sectors: &Sectors,
     frames: &Frames,
     (e, beside): (usize, &[(u32, u8)]),
     spans: usize,
-    known: &mut InnerFits,
+    known: &mut KnownEdge,
 ) -> Option<SmoothCurve> {
     let edge = &given.layout.edges[e];
-    let path = straightened(&given.path(Spoke { edge: e as u32, reversed: false }));
     // The sectors at both ends: the corner of the first quad where the edge starts, and where it ends.
     let &(quad, side) = beside.first()?;
     let forwards = !given.layout.quads[quad as usize][side as usize].reversed;
     let corners = [side, (side + 1) % 4].map(|k| sectors.at[quad as usize][k as usize] as usize);
-    let ends = if forwards { corners } else { [corners[1], corners[0]] };
-    let end_data: Vec<(LocalSurface, DVec3)> = (0..2)
-        .map(|k| {
-            let frame = &frames.frames[ends[k]];
-            let spoke = Spoke { edge: e as u32, reversed: k == 1 };
-            let at = sectors.list[ends[k]].spokes.iter().position(|s| *s == spoke)?;
-            Some((frame.surface, frame.directions[at]))
-        })
-        .collect::<Option<_>>()?;
-    if (known.spans, known.reach) != (spans, given.reach[e]) {
+    let sector_at = if forwards { corners } else { [corners[1], corners[0]] };
+    let end = |k: usize| {
+        let frame = &frames.frames[sector_at[k]];
+        let spoke = Spoke { edge: e as u32, reversed: k == 1 };
+        let at = sectors.list[sector_at[k]].spokes.iter().position(|s| *s == spoke)?;
+        Some((frames.positions[edge.ends[k] as usize], frame.surface, frame.directions[at]))
+    };
+    let input = CurveInput { spans, reach: given.reach[e], ends: [end(0)?, end(1)?] };
+    if let Some((_, curve)) = known.curve.as_ref().filter(|(same, _)| *same == input) {
+        return Some(curve.clone());
+    }
+    let path = straightened(&given.path(Spoke { edge: e as u32, reversed: false }));
+    if (known.inner.spans, known.inner.reach) != (spans, given.reach[e]) {
         // All quads around both ends take part: near an end the fit sees what the end saw.
         let mut quads: Vec<(u32, u8)> =
-            ends.iter().flat_map(|&s| sectors.list[s].quads.iter().copied()).collect();
+            sector_at.iter().flat_map(|&s| sectors.list[s].quads.iter().copied()).collect();
         quads.extend(beside);
         quads.sort_unstable();
         quads.dedup_by_key(|q| q.0);
@@ -89,30 +122,36 @@ pub(crate) fn smooth_curve(
             let at = point_along(&path, &along, k as f64 / spans as f64);
             local_surface(&around, at, Known::Nothing, given.reach[e])
         };
-        *known = InnerFits { spans, reach: given.reach[e], surfaces: (1..spans).map(fit).collect() };
+        known.inner = InnerFits { spans, reach: given.reach[e], surfaces: (1..spans).map(fit).collect() };
     }
-    let mut points = vec![frames.positions[edge.ends[0] as usize]];
-    points.extend(known.surfaces.iter().map(|surface| surface.position));
-    let mut surfaces = vec![end_data[0].0];
-    surfaces.extend(&known.surfaces);
-    points.push(frames.positions[edge.ends[1] as usize]);
-    surfaces.push(end_data[1].0);
+    let curve = through(&input, &known.inner.surfaces, &path)?;
+    known.curve = Some((input, curve.clone()));
+    Some(curve)
+}
+
+/// The curve between two ends through the inner `fits`, along the `path` of the mesh.
+fn through(input: &CurveInput, fits: &[LocalSurface], path: &[DVec3]) -> Option<SmoothCurve> {
+    let (spans, [start, end]) = (input.spans, &input.ends);
+    let points = [start.0].into_iter().chain(fits.iter().map(|fit| fit.position)).chain([end.0]);
+    let mut points: Vec<DVec3> = points.collect();
+    let surfaces: Vec<LocalSurface> =
+        [start.1].into_iter().chain(fits.iter().copied()).chain([end.1]).collect();
 
     let step = 1.0 / spans as f64;
     // Along the given directions, as fast as the chord to the next break needs.
     let first = (points[1] - points[0]).length() / step;
     let last = (points[spans] - points[spans - 1]).length() / step;
     let ends = [
-        end_data[0].1 * speed(first, points[1] - points[0], end_data[0].1),
-        -end_data[1].1 * speed(last, points[spans - 1] - points[spans], end_data[1].1),
+        start.2 * speed(first, points[1] - points[0], start.2),
+        -end.2 * speed(last, points[spans - 1] - points[spans], end.2),
     ];
     let measured = points.clone();
     let mut slopes = curvature_continuous(&mut points, ends, [&surfaces[0], &surfaces[spans]]);
-    if runs_back(&hermite::control(&points, &slopes), &path) {
+    if runs_back(&hermite::control(&points, &slopes), path) {
         // Without the curvature at the ends, and if need be without the points between.
         points = measured;
         slopes = clamped(&points, ends);
-        if runs_back(&hermite::control(&points, &slopes), &path) {
+        if runs_back(&hermite::control(&points, &slopes), path) {
             (points, slopes) = single_cubic([points[0], points[spans]], ends, spans);
         }
     }

@@ -12,7 +12,7 @@ use crate::hermite;
 use crate::knot_insertion::insert_knots;
 use crate::network::{KnownFits, Network, network};
 use crate::patch_fit::Net;
-use crate::patches::{Fitted, Patches, places};
+use crate::patches::{Patches, Round, places};
 use crate::refinement::Refinement;
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
@@ -20,54 +20,59 @@ use crate::simplify::simplify;
 use crate::unit::key_of;
 use crate::{CurveShape, EdgeCurve, Parameters, Patch, PatchSide, SplineFitError, SplineSurface};
 use rayon::prelude::*;
+use topipe_mesh::spatial::SurfaceIndex;
 use topipe_progress::{Progress, UnitKey, Units};
 use topipe_quad_matching::QuadLayout;
 
 /// Fits a surface whose patches meet with common tangents off the features.
 pub(crate) fn fit(
-    layout: &QuadLayout,
+    mut setting: Setting<'_>,
     mut samples: Vec<PatchSamples>,
     parameters: &Parameters,
     units: &Units,
     progress: &Progress,
 ) -> Result<SplineSurface, SplineFitError> {
-    let mut setting = Setting::new(layout)?;
-    setting.make_corners(&samples, parameters.spans as usize, progress);
+    let (layout, spans) = (setting.layout, parameters.spans as usize);
+    // Building the index is work for one thread.
+    let (index, ()) = rayon::join(
+        || (parameters.refinements > 0).then(|| SurfaceIndex::build(&layout.part.mesh)),
+        || setting.make_corners(&samples, spans, progress),
+    );
     let setting = setting;
-    let mut refinement = Refinement::new(&setting, parameters);
+    let mut refinement = Refinement::new(&setting, parameters, index);
     let starts = samples.par_iter().map(places).collect();
     let keys = if units.are_kept() { samples.par_iter().map(key_of).collect() } else { Vec::new() };
     let patches = Patches { setting: &setting, parameters, units, progress, starts, samples: keys };
-    let mut before: Vec<Fitted> = Vec::new();
+    let mut before: Option<Round> = None;
     let mut known = KnownFits::default();
     loop {
         progress.check()?;
         let network =
             network(&setting, &samples, refinement.spans(), &refinement.reach(&setting), &mut known)?;
-        let mut fitted = patches.fit(&mut samples, &network, refinement.spans(), before)?;
-        if !refinement.next(&setting, &network, &fitted, progress)
-            && !refinement.ease(&setting, &fitted, &samples, progress)
+        let round = patches.fit(&mut samples, network, refinement.spans(), before)?;
+        if !refinement.next(&setting, &round.network, &round.fitted, progress)
+            && !refinement.ease(&setting, &round.fitted, &samples, progress)
         {
+            let Round { network, mut fitted, .. } = round;
             patches.draw_nearer(&mut fitted, &mut samples)?;
             let nets = insert_knots(&setting, &network.curves, &fitted, parameters.max_normal_jump, progress);
             let mut surface = assemble(&setting, network, nets);
             simplify(&mut surface, setting.borders.tolerance);
             return Ok(surface);
         }
-        before = fitted;
+        before = Some(round);
     }
 }
 
 /// The keys of the patches of the first round, before any knots are inserted.
 pub(crate) fn first_patches(
-    layout: &QuadLayout,
+    mut setting: Setting<'_>,
     samples: &[PatchSamples],
     parameters: &Parameters,
 ) -> Result<Vec<UnitKey>, SplineFitError> {
     let progress = Progress::silent();
-    let mut setting = Setting::new(layout)?;
     setting.make_corners(samples, parameters.spans as usize, &progress);
-    let refinement = Refinement::new(&setting, parameters);
+    let refinement = Refinement::new(&setting, parameters, None);
     let network = network(
         &setting,
         samples,
@@ -79,8 +84,7 @@ pub(crate) fn first_patches(
     let (units, starts) = (&Units::none(), Vec::new());
     let patches =
         Patches { setting: &setting, parameters, units, progress: &progress, starts, samples: keys };
-    let (borders, corners) = patches.given(&network, refinement.spans());
-    Ok(patches.keys(&borders, &corners))
+    Ok(patches.first_keys(&network, refinement.spans()))
 }
 
 fn assemble(setting: &Setting<'_>, network: Network, nets: Vec<Net>) -> SplineSurface {
