@@ -7,7 +7,6 @@
 
 use crate::DeviationFigures;
 use rayon::prelude::*;
-use std::sync::OnceLock;
 use topipe_mesh::spatial::{NearestPoint, SurfaceIndex, Trail, along_curve};
 use topipe_mesh::{DVec3, TriangleMesh};
 
@@ -34,8 +33,8 @@ pub(crate) struct Surface<'a> {
     pub(crate) index: SurfaceIndex,
     /// Points and the area each stands for.
     samples: Vec<(DVec3, f64)>,
-    /// The samples along a curve through space, once that is asked for.
-    order: OnceLock<Vec<u32>>,
+    /// The samples along a curve through space, so that neighbours follow each other, and are in the cache.
+    order: Vec<u32>,
     refine: Option<Refine<'a>>,
     search: Option<Search<'a>>,
     climb: Option<Climb<'a>>,
@@ -53,25 +52,19 @@ impl<'a> Surface<'a> {
             centroids.push((mesh.centroid(f), 0.75 * area));
         }
         let used = mesh.positions.iter().copied().zip(weights).filter(|&(_, weight)| weight > 0.0);
-        let samples = used.chain(centroids).collect();
-        Self {
-            index: SurfaceIndex::build(mesh),
-            samples,
-            order: OnceLock::new(),
-            refine: None,
-            search: None,
-            climb: None,
-        }
+        let samples: Vec<(DVec3, f64)> = used.chain(centroids).collect();
+        let (index, order) = arrange(mesh, &samples);
+        Self { index, samples, order, refine: None, search: None, climb: None }
     }
 
+    /// A spline surface: what [`arrange`] makes of its triangulation and `samples`, and ways to true distances.
     pub(crate) fn of_samples(
-        index: SurfaceIndex,
+        (index, order): (SurfaceIndex, Vec<u32>),
         samples: Vec<(DVec3, f64)>,
         refine: Refine<'a>,
         search: Search<'a>,
         climb: Climb<'a>,
     ) -> Self {
-        let order = OnceLock::new();
         Self { index, samples, order, refine: Some(refine), search: Some(search), climb: Some(climb) }
     }
 
@@ -94,11 +87,12 @@ impl<'a> Surface<'a> {
         }
         self.index.nearest_beyond(p, limit, trail).map(|found| found.distance)
     }
+}
 
-    /// The samples so that neighbours follow each other, and are in the cache.
-    fn order(&self) -> &[u32] {
-        self.order.get_or_init(|| along_curve(&self.samples.iter().map(|s| s.0).collect::<Vec<_>>()))
-    }
+/// The index of a triangulation, and the order of samples.
+pub(crate) fn arrange(mesh: &TriangleMesh, samples: &[(DVec3, f64)]) -> (SurfaceIndex, Vec<u32>) {
+    let points = || samples.iter().map(|s| s.0).collect::<Vec<_>>();
+    rayon::join(|| SurfaceIndex::build(mesh), || along_curve(&points()))
 }
 
 /// One side: the samples of `from` and their distances from `to`.
@@ -110,8 +104,8 @@ struct Side {
 }
 
 fn side(from: &Surface<'_>, to: &Surface<'_>) -> Option<Side> {
-    let order = from.order();
-    let found: Vec<f64> = order
+    let found: Vec<f64> = from
+        .order
         .par_chunks(CHUNK)
         .flat_map_iter(|chunk| {
             let mut trail = Trail::default();
@@ -127,7 +121,7 @@ fn side(from: &Surface<'_>, to: &Surface<'_>) -> Option<Side> {
         })
         .collect();
     let mut distances: Vec<(f64, f64)> = from.samples.iter().map(|s| (0.0, s.1)).collect();
-    order.iter().zip(found).for_each(|(&k, d)| distances[k as usize].0 = d);
+    from.order.iter().zip(found).for_each(|(&k, d)| distances[k as usize].0 = d);
     let area: f64 = distances.iter().map(|&(_, weight)| weight).sum();
     if !(area > 0.0 && area.is_finite()) {
         return None;
@@ -135,7 +129,7 @@ fn side(from: &Surface<'_>, to: &Surface<'_>) -> Option<Side> {
     let mean = distances.iter().map(|&(d, w)| d * w).sum::<f64>() / area;
     let mean_square = distances.iter().map(|&(d, w)| d * d * w).sum::<f64>() / area;
     let max = between_samples(&distances, from, to, largest(&distances, from, to)?);
-    distances.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    distances.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let (mut below, mut p95) = (0.0, max.0);
     for (d, weight) in distances {
         below += weight;
@@ -188,7 +182,9 @@ pub(crate) fn between(a: &Surface<'_>, b: &Surface<'_>, diagonal: f64) -> Option
     if a.index.is_empty() || b.index.is_empty() {
         return None;
     }
-    let (there, back) = (side(a, b)?, side(b, a)?);
+    // Either has parts that only one thread can do.
+    let (there, back) = rayon::join(|| side(a, b), || side(b, a));
+    let (there, back) = (there?, back?);
     let mean_mm = (there.mean + back.mean) / 2.0;
     let max = if back.max.0 > there.max.0 { back.max } else { there.max };
     Some(DeviationFigures {

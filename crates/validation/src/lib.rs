@@ -114,20 +114,21 @@ pub fn validate(
     step()?;
     topology::check(inputs.original, "original")?;
     let diagonal = inputs.original.mesh.diagonal();
-    let original = Surface::of_mesh(&inputs.original.mesh);
-    let original_figures = topology::original(inputs.original);
-
-    let mesh = match inputs.mesh {
-        None => None,
-        Some(part) => {
-            step()?;
-            topology::check(part, "mesh")?;
-            Some((part, Surface::of_mesh(&part.mesh)))
-        }
-    };
+    if let Some(part) = inputs.mesh {
+        step()?;
+        topology::check(part, "mesh")?;
+    }
+    // Here and below: what only one thread can do is done beside other things.
+    let ((original, original_figures), mesh) = rayon::join(
+        || (Surface::of_mesh(&inputs.original.mesh), topology::original(inputs.original)),
+        || inputs.mesh.map(|part| (part, Surface::of_mesh(&part.mesh))),
+    );
     let smoothing = mesh.as_ref().map(|(part, surface)| {
-        let deviation = deviation::between(&original, surface, diagonal);
-        smoothing::figures(inputs.original, part, deviation)
+        let (deviation, figures) = rayon::join(
+            || deviation::between(&original, surface, diagonal),
+            || smoothing::figures(inputs.original, part),
+        );
+        SmoothingFigures { deviation, ..figures }
     });
 
     let layout = match inputs.layout {
@@ -145,20 +146,18 @@ pub fn validate(
         Some(surface) => {
             step()?;
             surface::check(surface)?;
-            // Either has long parts that only one thread can do.
             let (figures, sampled) = rayon::join(
                 || surface::figures(surface, reference_part, reference, parameters, progress),
                 || surface::sample(surface, reference_part.mesh.mean_edge_length()),
             );
             let mut figures = figures?;
             progress.check()?;
-            figures.deviation = deviation::between(reference, &sampled, diagonal);
-            progress.check()?;
-            figures.deviation_original = if inputs.mesh.is_some() {
-                deviation::between(&original, &sampled, diagonal)
-            } else {
-                figures.deviation.clone()
-            };
+            let (deviation, from_original) = rayon::join(
+                || deviation::between(reference, &sampled, diagonal),
+                || mesh.as_ref().and_then(|_| deviation::between(&original, &sampled, diagonal)),
+            );
+            figures.deviation_original = if mesh.is_some() { from_original } else { deviation.clone() };
+            figures.deviation = deviation;
             Some(figures)
         }
     };

@@ -3,13 +3,14 @@
 mod angles;
 mod regions;
 
-use crate::{DeviationFigures, SmoothingFigures};
+use crate::SmoothingFigures;
 use topipe_mesh::{Part, Provenance};
 
 /// A hollow that goes around its axis by less is a fillet or the end of a slot, degrees.
 const HOLE_ARC: f64 = 300.0;
 
-pub(crate) fn figures(original: &Part, part: &Part, deviation: Option<DeviationFigures>) -> SmoothingFigures {
+/// All but the deviation, which needs the surfaces made ready for it.
+pub(crate) fn figures(original: &Part, part: &Part) -> SmoothingFigures {
     let record = part.smoothing.clone().unwrap_or_default();
     let (before, volume_mm3) = (original.mesh.volume(), part.mesh.volume());
     let same_vertices = original.mesh.vertex_count() == part.mesh.vertex_count();
@@ -32,7 +33,7 @@ pub(crate) fn figures(original: &Part, part: &Part, deviation: Option<DeviationF
         cylinders,
         shape: angles::figures(original, part),
         flat_faces: regions::flat_faces(original, part),
-        deviation,
+        deviation: None,
     }
 }
 

@@ -1,10 +1,10 @@
 //! Points on a spline surface, a triangulation between them, and the way from the triangulation to the surface.
 
 use super::climb;
-use crate::deviation::{Beyond, Surface};
+use crate::deviation::{Beyond, Surface, arrange};
 use rayon::prelude::*;
 use std::sync::Arc;
-use topipe_mesh::spatial::{NearestPoint, SurfaceIndex};
+use topipe_mesh::spatial::NearestPoint;
 use topipe_mesh::{DVec3, RegionShape, TriangleMesh, VertexId};
 use topipe_spline_fit::{Basis, Patch, SplineSurface};
 
@@ -73,7 +73,7 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
         let patch = begins.partition_point(|&(first, _)| first <= sample) - 1;
         Some(climb::climb(&surface.patches[patch], place, begins[patch].1, beyond))
     };
-    let index = SurfaceIndex::build(&mesh);
+    let arranged = arrange(&mesh, &samples);
     let boxes: Vec<[DVec3; 2]> = surface.patches.iter().map(bounds).collect();
     let refine = move |p: DVec3, nearest: &NearestPoint| {
         let face = nearest.face.index();
@@ -90,7 +90,7 @@ pub(crate) fn sample(surface: &SplineSurface, spacing: f64) -> Surface<'_> {
         distance(patch, p, start)
     };
     let search = move |p: DVec3, found: f64| nearest_of_all(surface, &boxes, p, found);
-    Surface::of_samples(index, samples, Box::new(refine), Box::new(search), Box::new(climb))
+    Surface::of_samples(arranged, samples, Box::new(refine), Box::new(search), Box::new(climb))
 }
 
 /// The distance from `p` to a face of known shape, given the nearest point of its triangulation.
