@@ -11,6 +11,7 @@ use crate::setting::Setting;
 use crate::unit;
 use crate::{Parameters, SplineFitError};
 use rayon::prelude::*;
+use std::cmp::Reverse;
 use std::sync::atomic::{AtomicU64, Ordering};
 use topipe_mesh::DVec3;
 use topipe_progress::{Progress, UnitKey, Units};
@@ -131,51 +132,55 @@ impl Patches<'_> {
         let products = products(given.iter().flatten().map(|(borders, _)| borders));
         let near_enough = parameters.near_enough(&layout.part.mesh);
         let done = AtomicU64::new(0);
-        let fitted = samples
-            .par_iter_mut()
-            .zip(before)
-            .zip(given.into_par_iter().zip(corners))
-            .enumerate()
+        let mut fitted = before;
+        let places = samples.iter_mut().zip(given).zip(corners).zip(&mut fitted).enumerate();
+        let mut tasks: Vec<_> = places
+            .filter_map(|(quad, (((samples, given), corners), fitted))| {
+                given.map(|(borders, key)| (quad, samples, borders, key, corners, fitted.take()))
+            })
+            .collect();
+        tasks.sort_by_key(|task| Reverse(work(&task.2)));
+        let mut made: Vec<(usize, Result<Fitted, SplineFitError>)> = tasks
+            .into_par_iter()
             .with_max_len(APART)
-            .map(|(quad, ((samples, before), (given, corners)))| {
-                progress.check()?;
-                // Knots were inserted elsewhere; the samples are where the fit has moved them.
-                let (borders, key) = match (given, before) {
-                    (None, Some(same)) => return Ok(same),
-                    (Some((borders, _)), Some(same))
-                        if same.borders == borders && same.corners == corners =>
-                    {
+            .map(|(quad, samples, borders, key, corners, before)| {
+                let fitted = || {
+                    progress.check()?;
+                    // Knots were inserted elsewhere; the samples are where the fit has moved them.
+                    if let Some(same) = before.filter(|b| b.borders == borders && b.corners == corners) {
                         return Ok(same);
                     }
-                    (Some(given), _) => given,
-                    (None, None) => {
-                        return Err(SplineFitError::Layout(format!("quad {quad} has no borders")));
+                    // Each refinement starts from the same parameters: what a patch becomes does not depend on the way there.
+                    put(samples, &self.starts[quad]);
+                    let task = PatchTask::new(&borders, &corners, &products, parameters, near_enough);
+                    let compute = |samples: &mut PatchSamples| {
+                        task.unfolded(samples).ok_or_else(|| {
+                            let at =
+                                layout.part.mesh.position(layout.vertices[layout.corners(quad)[0] as usize]);
+                            SplineFitError::Singular { what: "patch", index: quad, x: at.x, y: at.y, z: at.z }
+                        })
+                    };
+                    let net = match key {
+                        Some(key) => unit::recall(units, key, samples, &borders, compute)?,
+                        None => compute(samples)?,
+                    };
+                    let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+                    if count.is_multiple_of(64) {
+                        progress.step(count, layout.quads.len() as u64, "patches");
                     }
+                    let farthest = net.farthest(samples);
+                    Ok(Fitted { borders, corners, net, farthest, key })
                 };
-                // Each refinement starts from the same parameters: what a patch becomes does not depend on the way there.
-                put(samples, &self.starts[quad]);
-                let task = PatchTask::new(&borders, &corners, &products, parameters, near_enough);
-                let compute = |samples: &mut PatchSamples| {
-                    task.unfolded(samples).ok_or_else(|| {
-                        let at = layout.part.mesh.position(layout.vertices[layout.corners(quad)[0] as usize]);
-                        SplineFitError::Singular { what: "patch", index: quad, x: at.x, y: at.y, z: at.z }
-                    })
-                };
-                let net = match key {
-                    Some(key) => unit::recall(units, key, samples, &borders, compute)?,
-                    None => compute(samples)?,
-                };
-                let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-                if count.is_multiple_of(64) {
-                    progress.step(count, layout.quads.len() as u64, "patches");
-                }
-                let farthest = net.farthest(samples);
-                Ok(Fitted { borders, corners, net, farthest, key })
+                (quad, fitted())
             })
-            // The first error in the order of the quads, for any number of threads.
-            .collect::<Vec<Result<Fitted, SplineFitError>>>()
-            .into_iter()
-            .collect::<Result<_, _>>()?;
+            .collect();
+        // The first error in the order of the quads, for any number of threads.
+        made.sort_unstable_by_key(|(quad, _)| *quad);
+        for (quad, made) in made {
+            fitted[quad] = Some(made?);
+        }
+        let missing = || SplineFitError::Layout("a quad has no borders".into());
+        let fitted = fitted.into_iter().map(|fitted| fitted.ok_or_else(missing)).collect::<Result<_, _>>()?;
         Ok(Round { network, spans: spans.to_vec(), fitted })
     }
 }
@@ -194,6 +199,12 @@ const MOST_SPANS: usize = 16;
 /// Spans along the side of a patch.
 fn side_spans(curve: &Curve, spans: usize) -> usize {
     curve.spans().min(MOST_SPANS).max(spans)
+}
+
+/// What a fit with these borders costs, roughly: its spans. The costliest patches are begun first; one of them left for the end is
+/// waited for by all other threads.
+pub(crate) fn work(borders: &[Border; 4]) -> usize {
+    borders[0].spans * borders[1].spans
 }
 
 /// Patches given to a thread together: in the last rounds a few patches, side by side, are all the work. Left to itself rayon gave

@@ -10,10 +10,11 @@
 
 use crate::SplineFitError;
 use crate::patch_fit::Net;
-use crate::patches::{APART, Fitted, PatchTask, Patches, places, products, put};
+use crate::patches::{APART, Fitted, PatchTask, Patches, places, products, put, work};
 use crate::samples::PatchSamples;
 use crate::unfolding::TIP;
 use rayon::prelude::*;
+use std::cmp::Reverse;
 use topipe_mesh::DVec3;
 
 /// Fits of one patch.
@@ -35,11 +36,11 @@ impl Patches<'_> {
         let tolerance = self.parameters.largest_distance(&self.setting.layout.part.mesh);
         let near_enough = self.parameters.near_enough(&self.setting.layout.part.mesh);
         let products = products(fitted.iter().map(|f| &f.borders));
-        fitted.par_iter_mut().zip(samples).with_max_len(APART).try_for_each(|(fitted, samples)| {
+        let mut far: Vec<_> =
+            fitted.iter_mut().zip(samples).filter(|(fitted, _)| fitted.farthest > tolerance).collect();
+        far.sort_by_key(|(fitted, _)| Reverse(work(&fitted.borders)));
+        far.into_par_iter().with_max_len(APART).try_for_each(|(fitted, samples)| {
             self.progress.check()?;
-            if fitted.farthest <= tolerance {
-                return Ok(());
-            }
             let task =
                 PatchTask::new(&fitted.borders, &fitted.corners, &products, self.parameters, near_enough);
             if let Some(nearer) = nearer(&task, &fitted.net, samples, tolerance) {

@@ -13,6 +13,7 @@ use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 use topipe_progress::{UnitKey, UnitStore};
 
@@ -54,6 +55,7 @@ struct State {
     writer: Option<Writer>,
     unwritten: Unwritten,
     counts: UnitCounts,
+    flush: Option<JoinHandle<()>>,
 }
 
 /// What could not be written yet, in the order in which it came.
@@ -110,7 +112,8 @@ impl UnitCheckpoints {
         Self { cache: cache.clone(), folder, stage, anew, state: Mutex::default(), report: Box::new(report) }
     }
 
-    /// Ends the run: flushes what was written, and marks what was used as used now.
+    /// Ends the run: marks what was used as used now, and begins to flush what was written. That goes on beside what follows, and is
+    /// waited for when this is dropped.
     pub(crate) fn finish(&self) -> UnitCounts {
         let mut state = self.lock();
         if let Err(error) = self.write_waiting(&mut state) {
@@ -118,8 +121,9 @@ impl UnitCheckpoints {
             (self.report)(Notice::NotKept(format!("{lost} of {made} finished parts are not kept: {error}")));
         }
         if let Some(writer) = state.writer.take() {
-            // Losing it with the power costs time only.
-            let _ = writer.file.sync_data();
+            // Losing it with the power costs time only, so it need not succeed, nor have a thread.
+            let flush = move || drop(writer.file.sync_data());
+            state.flush = std::thread::Builder::new().spawn(flush).ok();
         }
         for segment in state.segments.iter().filter(|segment| segment.used && !segment.condemned) {
             // It only guides what is thrown away first.
@@ -241,6 +245,15 @@ impl UnitCheckpoints {
             state.index.insert(key, (at, record));
         }
         Ok(())
+    }
+}
+
+impl Drop for UnitCheckpoints {
+    fn drop(&mut self) {
+        // Whoever comes next under the lock of the key finds all of it on the disk.
+        if let Some(flush) = self.lock().flush.take() {
+            let _ = flush.join();
+        }
     }
 }
 
