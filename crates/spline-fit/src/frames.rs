@@ -213,8 +213,8 @@ fn frame(
             let normal = across.normalize_or_zero();
             // Nearly parallel directions fix the plane too: two patches between them have no other in common. Where there is
             // one, and noise turns the plane away from the mesh, the mesh's own is taken.
-            let seen = sector.quads.len() > 1 || normal.dot(rough).abs() >= FAR;
-            if across.length() > CORNER || across.length() > LEAVES && seen {
+            let is_certain = sector.quads.len() > 1 || normal.dot(rough).abs() >= FAR;
+            if across.length() > CORNER || across.length() > LEAVES && is_certain {
                 Known::Normal(if normal.dot(rough) < 0.0 { -normal } else { normal })
             } else {
                 // One curve that passes through, in opposite directions, or two that leave side by side.
