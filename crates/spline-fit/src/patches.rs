@@ -307,3 +307,52 @@ fn borders_of(setting: &Setting<'_>, quad: usize, curves: &[Curve], spans: &[usi
         Border { control, spans: spans[k], ribbon: ribbons[k].take() }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::{KnownFits, network};
+    use crate::setting::tests::layout;
+
+    /// A round that takes patches over from the one before is the round that begins with nothing, and nothing but what lies around
+    /// a changed curve is fitted anew.
+    #[test]
+    fn a_round_takes_over_what_has_not_changed() {
+        let (layout, samples) = layout("y-form");
+        let parameters = Parameters::default();
+        let progress = Progress::silent();
+        let mut setting = Setting::new(&layout).unwrap();
+        setting.make_corners(&samples, 4, &progress);
+        let starts = samples.iter().map(places).collect();
+        let (setting, units) = (&setting, &Units::none());
+        let patches =
+            Patches { setting, parameters: &parameters, units, progress: &progress, starts, samples: vec![] };
+        let refined = layout.edges.len() / 2;
+        let round = |finer: bool, samples: &mut Vec<PatchSamples>, before| {
+            let spans: Vec<usize> =
+                (0..layout.edges.len()).map(|e| if finer && e == refined { 8 } else { 4 }).collect();
+            let network =
+                network(setting, samples, &spans, &setting.reach(&spans), &mut KnownFits::default()).unwrap();
+            patches.fit(samples, network, &spans, before).unwrap()
+        };
+        let (mut moved, mut fresh) = (samples.clone(), samples);
+        let mut first = round(false, &mut moved, None);
+        // What is taken over keeps the mark.
+        first.fitted.iter_mut().for_each(|fitted| fitted.farthest = -1.0);
+        let second = round(true, &mut moved, Some(first));
+        let alone = round(true, &mut fresh, None);
+        let ends = layout.edges[refined].ends;
+        let mut again = 0;
+        for (quad, (found, alone)) in second.fitted.iter().zip(&alone.fitted).enumerate() {
+            assert_eq!(found.net.control, alone.net.control);
+            assert!(found.borders == alone.borders && found.corners == alone.corners);
+            if found.farthest >= 0.0 {
+                again += 1;
+                // The normals at its ends turn as it bends, along all edges there.
+                assert!(layout.corners(quad).iter().any(|v| ends.contains(v)), "quad {quad} is fitted anew");
+            }
+        }
+        assert!(again > 0);
+        assert!(moved.iter().zip(&fresh).all(|(moved, fresh)| places(moved) == places(fresh)));
+    }
+}
