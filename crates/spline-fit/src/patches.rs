@@ -38,6 +38,8 @@ pub(crate) struct Round {
 pub(crate) struct Patches<'a> {
     pub(crate) setting: &'a Setting<'a>,
     pub(crate) parameters: &'a Parameters,
+    /// See [`Parameters::near_enough`], mm; it takes a look at the whole mesh.
+    pub(crate) near_enough: f64,
     pub(crate) units: &'a Units,
     pub(crate) progress: &'a Progress,
     /// Parameters that the samples of each patch begin with.
@@ -67,8 +69,7 @@ impl Patches<'_> {
 
     /// The key under which a patch is kept.
     fn key(&self, quad: usize, borders: &[Border; 4], corners: &[DVec3; 4]) -> UnitKey {
-        let near_enough = self.parameters.near_enough(&self.setting.layout.part.mesh);
-        unit::key(self.samples[quad], borders, corners, self.parameters, near_enough)
+        unit::key(self.samples[quad], borders, corners, self.parameters, self.near_enough)
     }
 
     /// The normals at the corners of all patches.
@@ -106,7 +107,7 @@ impl Patches<'_> {
         spans: &[usize],
         before: Option<Round>,
     ) -> Result<Round, SplineFitError> {
-        let Self { setting, parameters, units, progress, .. } = *self;
+        let Self { setting, parameters, near_enough, units, progress, .. } = *self;
         let layout = setting.layout;
         let corners = self.corners(&network);
         let (unchanged, before) = match before {
@@ -130,7 +131,6 @@ impl Patches<'_> {
         };
         units.announce("patches", &given.iter().zip(&before).filter_map(key_of).collect::<Vec<_>>());
         let products = products(given.iter().flatten().map(|(borders, _)| borders));
-        let near_enough = parameters.near_enough(&layout.part.mesh);
         let done = AtomicU64::new(0);
         let mut fitted = before;
         let places = samples.iter_mut().zip(given).zip(corners).zip(&mut fitted).enumerate();
@@ -325,8 +325,9 @@ mod tests {
         setting.make_corners(&samples, 4, &progress);
         let starts = samples.iter().map(places).collect();
         let (setting, units) = (&setting, &Units::none());
-        let patches =
-            Patches { setting, parameters: &parameters, units, progress: &progress, starts, samples: vec![] };
+        let near_enough = parameters.near_enough(&layout.part.mesh);
+        let (parameters, progress) = (&parameters, &progress);
+        let patches = Patches { setting, parameters, near_enough, units, progress, starts, samples: vec![] };
         let refined = layout.edges.len() / 2;
         let round = |finer: bool, samples: &mut Vec<PatchSamples>, before| {
             let spans: Vec<usize> =

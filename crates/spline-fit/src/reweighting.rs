@@ -34,15 +34,19 @@ impl Patches<'_> {
         samples: &mut [PatchSamples],
     ) -> Result<(), SplineFitError> {
         let tolerance = self.parameters.largest_distance(&self.setting.layout.part.mesh);
-        let near_enough = self.parameters.near_enough(&self.setting.layout.part.mesh);
         let products = products(fitted.iter().map(|f| &f.borders));
         let mut far: Vec<_> =
             fitted.iter_mut().zip(samples).filter(|(fitted, _)| fitted.farthest > tolerance).collect();
         far.sort_by_key(|(fitted, _)| Reverse(work(&fitted.borders)));
         far.into_par_iter().with_max_len(APART).try_for_each(|(fitted, samples)| {
             self.progress.check()?;
-            let task =
-                PatchTask::new(&fitted.borders, &fitted.corners, &products, self.parameters, near_enough);
+            let task = PatchTask::new(
+                &fitted.borders,
+                &fitted.corners,
+                &products,
+                self.parameters,
+                self.near_enough,
+            );
             if let Some(nearer) = nearer(&task, &fitted.net, samples, tolerance) {
                 fitted.net = nearer;
             }

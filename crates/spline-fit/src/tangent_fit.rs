@@ -42,7 +42,9 @@ pub(crate) fn fit(
     let mut refinement = Refinement::new(&setting, parameters, index);
     let starts = samples.par_iter().map(places).collect();
     let keys = if units.are_kept() { samples.par_iter().map(key_of).collect() } else { Vec::new() };
-    let patches = Patches { setting: &setting, parameters, units, progress, starts, samples: keys };
+    let near_enough = parameters.near_enough(&layout.part.mesh);
+    let patches =
+        Patches { setting: &setting, parameters, near_enough, units, progress, starts, samples: keys };
     let mut before: Option<Round> = None;
     let mut known = KnownFits::default();
     loop {
@@ -82,8 +84,10 @@ pub(crate) fn first_patches(
     )?;
     let keys = samples.par_iter().map(key_of).collect();
     let (units, starts) = (&Units::none(), Vec::new());
+    let near_enough = parameters.near_enough(&setting.layout.part.mesh);
+    let progress = &progress;
     let patches =
-        Patches { setting: &setting, parameters, units, progress: &progress, starts, samples: keys };
+        Patches { setting: &setting, parameters, near_enough, units, progress, starts, samples: keys };
     Ok(patches.first_keys(&network, refinement.spans()))
 }
 
