@@ -43,8 +43,9 @@ pub(crate) struct Borders {
 /// Fails when the layout's arrays do not fit together.
 pub(crate) fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
     let sides = sides(layout)?;
-    let shapes = shapes(layout, &sides);
-    let tolerance = TOLERANCE * layout.part.mesh.diagonal();
+    let diagonal = layout.part.mesh.diagonal();
+    let tolerance = TOLERANCE * diagonal;
+    let shapes = shapes(layout, &sides, tolerance);
     let faces = layout
         .region_faces
         .iter()
@@ -89,7 +90,7 @@ pub(crate) fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
     }
     let grain = grain(&layout.part.mesh);
     for chain in chains::chains(layout, &sides, &borders.curves, grain) {
-        outline::fit(layout, &chain, &shapes[chain.region.index()], grain, &mut borders);
+        outline::fit(layout, &chain, &shapes[chain.region.index()], grain, diagonal, &mut borders);
     }
     let connectivity =
         Connectivity::build(&layout.part.mesh).map_err(|error| SplineFitError::Layout(error.to_string()))?;
@@ -137,7 +138,7 @@ fn sides(layout: &QuadLayout) -> Result<Vec<Beside>, SplineFitError> {
 
 /// The shapes of the regions, with the axis of a cylinder turned into the normal of a plane beside it where the mesh
 /// can not tell the two directions apart: their intersection then is a circle.
-fn shapes(layout: &QuadLayout, sides: &[Beside]) -> Vec<RegionShape> {
+fn shapes(layout: &QuadLayout, sides: &[Beside], tolerance: f64) -> Vec<RegionShape> {
     let regions = &layout.part.regions;
     let mut shapes: Vec<RegionShape> = regions.iter().map(|r| r.shape).collect();
     let mut extent = vec![0.0f64; regions.len()];
@@ -163,7 +164,7 @@ fn shapes(layout: &QuadLayout, sides: &[Beside]) -> Vec<RegionShape> {
             };
             let tilt = axis.cross(normal).length();
             let seen = regions[c.index()].residual + regions[p.index()].residual;
-            let unseen = seen.max(TOLERANCE * layout.part.mesh.diagonal());
+            let unseen = seen.max(tolerance);
             if tilt * extent[c.index()] <= unseen && tilt < nearest[c.index()] {
                 nearest[c.index()] = tilt;
                 if let RegionShape::Cylinder { axis: turned, .. } = &mut shapes[c.index()] {

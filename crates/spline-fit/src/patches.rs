@@ -27,6 +27,12 @@ pub(crate) struct Fitted {
     key: Option<UnitKey>,
 }
 
+/// What a patch is to be fitted to, and the key it is kept under, where patches are kept.
+struct Given {
+    borders: [Border; 4],
+    key: Option<UnitKey>,
+}
+
 /// All patches, and what they were fitted to.
 pub(crate) struct Round {
     pub(crate) network: Network,
@@ -117,26 +123,24 @@ impl Patches<'_> {
         let mut before: Vec<Option<Fitted>> = before.into_iter().map(Some).collect();
         before.resize_with(samples.len(), || None);
         // None where it is the same as before.
-        let given: Vec<Option<([Border; 4], Option<UnitKey>)>> = unchanged
+        let given: Vec<Option<Given>> = unchanged
             .par_iter()
             .enumerate()
             .map(|(quad, same)| {
                 let borders = (!same).then(|| borders_of(setting, quad, &network.curves, spans))?;
                 let key = units.are_kept().then(|| self.key(quad, &borders, &corners[quad]));
-                Some((borders, key))
+                Some(Given { borders, key })
             })
             .collect();
-        let key_of = |(given, before): (&Option<([Border; 4], Option<UnitKey>)>, &Option<Fitted>)| {
-            given.as_ref().map_or_else(|| before.as_ref().and_then(|b| b.key), |given| given.1)
-        };
-        units.announce("patches", &given.iter().zip(&before).filter_map(key_of).collect::<Vec<_>>());
-        let products = products(given.iter().flatten().map(|(borders, _)| borders));
+        let key = |quad: usize| given[quad].as_ref().map_or_else(|| before[quad].as_ref()?.key, |g| g.key);
+        units.announce("patches", &(0..given.len()).filter_map(key).collect::<Vec<_>>());
+        let products = products(given.iter().flatten().map(|given| &given.borders));
         let done = AtomicU64::new(0);
         let mut fitted = before;
         let places = samples.iter_mut().zip(given).zip(corners).zip(&mut fitted).enumerate();
         let mut tasks: Vec<_> = places
             .filter_map(|(quad, (((samples, given), corners), fitted))| {
-                given.map(|(borders, key)| (quad, samples, borders, key, corners, fitted.take()))
+                given.map(|Given { borders, key }| (quad, samples, borders, key, corners, fitted.take()))
             })
             .collect();
         tasks.sort_by_key(|task| Reverse(work(&task.2)));

@@ -101,11 +101,12 @@ pub(super) fn fit(
     chain: &Chain,
     shape: &RegionShape,
     grain: f64,
+    diagonal: f64,
     borders: &mut Borders,
 ) {
     let development = Development::new(shape);
     let outline = Outline::new(layout, chain, &development, borders);
-    let Some(curve) = outline.curve(chain, grain, layout.part.mesh.diagonal()) else { return };
+    let Some(curve) = outline.curve(chain, grain, diagonal) else { return };
 
     // Vertices inside the chain move onto the curve.
     let count = chain.sides.len();
