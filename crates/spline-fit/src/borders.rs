@@ -103,7 +103,8 @@ pub(crate) fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
 }
 
 /// The length of an edge of a face at a random place of the surface, mm. Cuts leave many short edges beside them, which
-/// hardly count here: it is about the mean edge length of the mesh before it was cut.
+/// hardly count here: it is about the mean edge length of the mesh before it was cut. Rounded to a 64th of an octave: all borders
+/// depend on it, and where a mesh is edited or divided in one place those of other places shall stay what they are.
 fn grain(mesh: &TriangleMesh) -> f64 {
     let (mut sum, mut area) = (0.0, 0.0);
     for f in mesh.faces() {
@@ -112,7 +113,7 @@ fn grain(mesh: &TriangleMesh) -> f64 {
         sum += weight * (a.distance(b) + b.distance(c) + c.distance(a)) / 3.0;
         area += weight;
     }
-    if area > 0.0 { sum / area } else { 0.0 }
+    if sum > 0.0 && area > 0.0 { ((64.0 * (sum / area).log2()).round() / 64.0).exp2() } else { 0.0 }
 }
 
 /// The regions beside an edge: of the loop that runs along it, and of the loop that runs against it.
