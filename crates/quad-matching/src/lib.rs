@@ -18,6 +18,7 @@
 
 mod cost;
 mod disk;
+mod divide;
 mod doublets;
 mod dual;
 mod ends;
@@ -35,6 +36,7 @@ mod spokes;
 mod straighten;
 mod verify;
 
+pub use divide::divide;
 pub use dual::match_quads;
 pub use error::QuadMatchingError;
 pub use layout::{MacroEdge, QuadLayout, RegionFace, Side};

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 use std::f64::consts::PI;
 use topipe_mesh::refine::Refiner;
-use topipe_mesh::{FaceId, HalfEdgeId, Provenance, VertexId};
+use topipe_mesh::{FaceId, FeatureKind, HalfEdgeId, Provenance, VertexId};
 use topipe_progress::Progress;
 
 /// A layout of regions with three or more sides, over the mesh of `tiled`, whose tiles are the regions; faces of no tile
@@ -123,6 +123,20 @@ fn middle_on_feature(tiled: &mut Tiled, path: &mut Vec<VertexId>, snap: f64, bes
     piece + 1
 }
 
+/// Index in the path of an edge of its middle, where it may be halved; `beside` are the regions on its sides.
+pub(crate) fn middle_of(
+    tiled: &mut Tiled,
+    path: &mut Vec<VertexId>,
+    feature: Option<FeatureKind>,
+    snap: f64,
+    beside: &[u32],
+) -> usize {
+    match feature {
+        Some(_) => middle_on_feature(tiled, path, snap, beside),
+        None => middle(tiled, path, snap),
+    }
+}
+
 /// Refines all regions.
 pub(crate) fn refine(regions: Regions, snap: f64, progress: &Progress) -> Result<Quads, QuadMatchingError> {
     let Regions { mut tiled, mut vertices, edges, sides } = regions;
@@ -136,10 +150,7 @@ pub(crate) fn refine(regions: Regions, snap: f64, progress: &Progress) -> Result
     }
     for (edge, beside) in edges.iter().zip(&beside) {
         let mut path = edge.path.clone();
-        let k = match edge.feature {
-            Some(_) => middle_on_feature(&mut tiled, &mut path, snap, beside),
-            None => middle(&mut tiled, &mut path, snap),
-        };
+        let k = middle_of(&mut tiled, &mut path, edge.feature, snap, beside);
         let number = vertices.len() as u32;
         vertices.push(path[k]);
         middles.push(path[k]);
@@ -230,7 +241,11 @@ fn fine_middle(fine: &[MacroEdge], edge: u32) -> u32 {
 }
 
 /// The quad of each face: what can be reached from a face beside its first side without crossing any side.
-fn flood(tiled: &Tiled, edges: &[MacroEdge], quads: &[[Side; 4]]) -> Result<Vec<u32>, QuadMatchingError> {
+pub(crate) fn flood(
+    tiled: &Tiled,
+    edges: &[MacroEdge],
+    quads: &[[Side; 4]],
+) -> Result<Vec<u32>, QuadMatchingError> {
     let key = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];
     let blocked: FxHashSet<[VertexId; 2]> =
         edges.iter().flat_map(|e| e.path.windows(2)).map(|w| key(w[0], w[1])).collect();

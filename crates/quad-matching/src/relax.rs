@@ -138,10 +138,20 @@ pub(crate) fn relax(
     snap: f64,
     progress: &Progress,
 ) -> Result<usize, QuadMatchingError> {
-    let worth: Vec<bool> = match effort {
-        Effort::Search => (0..regions.sides.len()).map(|r| !within_gates(regions, r)).collect(),
-        Effort::Straighten | Effort::Improve => vec![true; regions.sides.len()],
-    };
+    relax_beside(regions, &vec![true; regions.sides.len()], effort, snap, progress)
+}
+
+/// The same at vertices of the regions that are marked; the others change where they have a vertex in common with these.
+pub(crate) fn relax_beside(
+    regions: &mut Regions,
+    marked: &[bool],
+    effort: Effort,
+    snap: f64,
+    progress: &Progress,
+) -> Result<usize, QuadMatchingError> {
+    let worth: Vec<bool> = (0..regions.sides.len())
+        .map(|r| marked[r] && (effort != Effort::Search || !within_gates(regions, r)))
+        .collect();
     if !worth.contains(&true) {
         return Ok(0);
     }
