@@ -54,6 +54,7 @@ input = "tiles"
 kind = "spline-fit"
 input = "quads"
 refinements = 0
+divisions = 0
 [export]
 "part.step" = "fit"
 "#;

@@ -19,11 +19,16 @@ pub fn fit(
 ) -> Result<SplineSurface, SplineFitError> {
     match parameters.continuity {
         Continuity::Position => {
-            crate::position_fit::fit(layout, samples(layout, parameters)?, parameters, progress)
+            parameters.basis()?;
+            check(layout)?;
+            crate::position_fit::fit(layout, samples(layout)?, parameters, progress)
         }
         Continuity::Tangent => {
-            let (setting, samples) = tangent_setting(layout, parameters)?;
-            crate::tangent_fit::fit(setting, samples, parameters, units, progress)
+            let fit = |layout: &QuadLayout| {
+                let (setting, samples) = tangent_setting(layout, parameters)?;
+                crate::tangent_fit::fit(setting, samples, parameters, units, progress)
+            };
+            crate::division::fit_dividing(layout, parameters, fit, progress)
         }
     }
 }
@@ -47,15 +52,13 @@ fn tangent_setting<'a>(
 ) -> Result<(Setting<'a>, Vec<PatchSamples>), SplineFitError> {
     parameters.basis()?;
     check(layout)?;
-    let (setting, samples) = rayon::join(|| Setting::new(layout), || samples(layout, parameters));
+    let (setting, samples) = rayon::join(|| Setting::new(layout), || samples(layout));
     // The error of the samples first, as if they had been taken first.
     let samples = samples?;
     Ok((setting?, samples))
 }
 
-fn samples(layout: &QuadLayout, parameters: &Parameters) -> Result<Vec<PatchSamples>, SplineFitError> {
-    parameters.basis()?;
-    check(layout)?;
+fn samples(layout: &QuadLayout) -> Result<Vec<PatchSamples>, SplineFitError> {
     let faces = faces_by_quad(layout);
     (0..layout.quads.len())
         .into_par_iter()

@@ -58,7 +58,7 @@ impl Refinement {
             spans: vec![parameters.spans as usize; setting.layout.edges.len()],
             rounds: if parameters.refinements > 0 { parameters.refinements + LATE_ROUNDS } else { 0 },
             closer: vec![1.0; setting.layout.edges.len()],
-            tolerance: parameters.largest_distance(&setting.layout.part.mesh),
+            tolerance: parameters.refined_distance(&setting.layout.part.mesh),
             index,
             easing: Easing::default(),
         }
@@ -67,6 +67,11 @@ impl Refinement {
     /// Spans of the curves.
     pub(crate) fn spans(&self) -> &[usize] {
         &self.spans
+    }
+
+    /// The index of the mesh.
+    pub(crate) fn index(&mut self, setting: &Setting<'_>) -> &SurfaceIndex {
+        self.index.get_or_insert_with(|| SurfaceIndex::build(&setting.layout.part.mesh))
     }
 
     /// Radii of the local fits, mm, one per edge.
@@ -149,10 +154,7 @@ fn is_far(setting: &Setting<'_>, network: &Network, index: &SurfaceIndex, limit:
     if setting.roles[e] != EdgeRole::Smooth {
         return false;
     }
-    let control = &network.curves[e].control;
-    let count = POINTS * (control.len() / 2 - 1);
-    let curve: Vec<DVec3> =
-        (0..=count).map(|k| hermite::derivatives(control, k as f64 / count as f64)[0]).collect();
+    let curve = curve_points(&network.curves[e].control);
     let layout = setting.layout;
     let path: Vec<DVec3> = layout.edges[e].path.iter().map(|&v| layout.part.mesh.position(v)).collect();
     // The path lies on the mesh: what is near it need not be looked for.
@@ -162,8 +164,14 @@ fn is_far(setting: &Setting<'_>, network: &Network, index: &SurfaceIndex, limit:
     path.iter().any(|&p| off(p, &curve) > limit)
 }
 
+/// Points of a curve, [`POINTS`] in each span.
+pub(crate) fn curve_points(control: &[DVec3]) -> Vec<DVec3> {
+    let count = POINTS * (control.len() / 2 - 1);
+    (0..=count).map(|k| hermite::derivatives(control, k as f64 / count as f64)[0]).collect()
+}
+
 /// The distance of a point from a polyline.
-fn off(p: DVec3, line: &[DVec3]) -> f64 {
+pub(crate) fn off(p: DVec3, line: &[DVec3]) -> f64 {
     line.windows(2).map(|w| distance(p, w[0], w[1])).fold(f64::INFINITY, f64::min)
 }
 

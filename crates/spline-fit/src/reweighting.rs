@@ -33,7 +33,7 @@ impl Patches<'_> {
         fitted: &mut [Fitted],
         samples: &mut [PatchSamples],
     ) -> Result<(), SplineFitError> {
-        let tolerance = self.parameters.largest_distance(&self.setting.layout.part.mesh);
+        let tolerance = self.parameters.refined_distance(&self.setting.layout.part.mesh);
         let products = products(fitted.iter().map(|f| &f.borders));
         let mut far: Vec<_> =
             fitted.iter_mut().zip(samples).filter(|(fitted, _)| fitted.farthest > tolerance).collect();

@@ -8,6 +8,7 @@
 //!
 //! Borders of region faces are given: their curves lie on the shapes, and where the mesh meets a shape smoothly the
 //! patch takes its normals along the border from the shape.
+use crate::beyond::{Beyond, Measured};
 use crate::hermite;
 use crate::knot_insertion::insert_knots;
 use crate::network::{KnownFits, Network, network};
@@ -24,6 +25,15 @@ use topipe_mesh::spatial::SurfaceIndex;
 use topipe_progress::{Progress, UnitKey, Units};
 use topipe_quad_matching::QuadLayout;
 
+/// What the fit to a layout has come to.
+pub(crate) struct Outcome {
+    pub(crate) surface: SplineSurface,
+    /// Where it is beyond the tolerance, the farthest first; not looked for where patches are not to be divided.
+    pub(crate) beyond: Vec<Beyond>,
+    /// See [`Parameters::largest_distance`], mm.
+    pub(crate) tolerance: f64,
+}
+
 /// Fits a surface whose patches meet with common tangents off the features.
 pub(crate) fn fit(
     mut setting: Setting<'_>,
@@ -31,7 +41,7 @@ pub(crate) fn fit(
     parameters: &Parameters,
     units: &Units,
     progress: &Progress,
-) -> Result<SplineSurface, SplineFitError> {
+) -> Result<Outcome, SplineFitError> {
     let (layout, spans) = (setting.layout, parameters.spans as usize);
     // Building the index is work for one thread.
     let (index, ()) = rayon::join(
@@ -57,10 +67,23 @@ pub(crate) fn fit(
         {
             let Round { network, mut fitted, .. } = round;
             patches.draw_nearer(&mut fitted, &mut samples)?;
-            let nets = insert_knots(&setting, &network.curves, &fitted, parameters.max_normal_jump, progress);
+            let tolerance = parameters.largest_distance(&layout.part.mesh);
+            let index = (parameters.divisions > 0).then(|| refinement.index(&setting));
+            let measured = index.map(|index| Measured {
+                setting: &setting,
+                network: &network,
+                fitted: &fitted,
+                samples: &samples,
+                index,
+            });
+            // Knots come in rounds that not all threads are busy in.
+            let (beyond, nets) = rayon::join(
+                || measured.map_or_else(Vec::new, |measured| measured.beyond(tolerance)),
+                || insert_knots(&setting, &network.curves, &fitted, parameters.max_normal_jump, progress),
+            );
             let mut surface = assemble(&setting, network, nets);
             simplify(&mut surface, setting.borders.tolerance);
-            return Ok(surface);
+            return Ok(Outcome { surface, beyond, tolerance });
         }
         before = Some(round);
     }

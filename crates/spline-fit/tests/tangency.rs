@@ -118,7 +118,7 @@ fn curves_come_near_to_the_mesh() {
     let layout = common::fixture("bracket");
     let mesh = &layout.part.mesh;
     let off = |refinements: u32| {
-        let parameters = Parameters { refinements, ..Default::default() };
+        let parameters = Parameters { refinements, divisions: 0, ..Default::default() };
         let surface = fit(&layout, &parameters, &Units::none(), &Progress::silent()).unwrap();
         curves_off(&surface, mesh) / mesh.diagonal()
     };

@@ -119,3 +119,22 @@ fn an_edit_leaves_borders_elsewhere_as_they_are() {
     let changed = before.iter().zip(&after).filter(|(a, b)| a != b).count();
     assert!((1..=before.len() / 10).contains(&changed), "{changed} of {}", before.len());
 }
+
+/// A division of the layout is another fit, but what it does not touch is kept.
+#[test]
+fn a_division_costs_the_patches_it_touches() {
+    let layout = fixture("monster-lite");
+    let store = Arc::new(Store::default());
+    let with = |divisions: u32| {
+        let parameters = Parameters { divisions, tolerance: 1.6e-3, ..Default::default() };
+        fit(&layout, &parameters, &Units::new(store.clone()), &Progress::silent()).unwrap()
+    };
+    let whole = with(0);
+    let (_, alone) = store.counts();
+    let divided = with(1);
+    let (found, computed) = store.counts();
+    assert!(divided.patches.len() > whole.patches.len());
+    assert!(computed > 0 && 2 * computed < alone, "{computed} after {alone}, {found} found");
+    assert!(with(1) == divided);
+    assert_eq!(store.counts().1, 0);
+}

@@ -1,0 +1,103 @@
+//! The tolerance: patches are divided until it holds, measured both ways by other means than the fit's own.
+
+mod common;
+
+use common::{fixture, largest_jump};
+use std::sync::{Arc, Mutex};
+use topipe_mesh::Connectivity;
+use topipe_mesh::spatial::SurfaceIndex;
+use topipe_progress::{Listener, Progress, Units};
+use topipe_quad_matching::QuadLayout;
+use topipe_spline_fit::{Parameters, SplineSurface, fit};
+
+/// Keeps what is remarked.
+#[derive(Default)]
+struct Remarks(Mutex<Vec<String>>);
+
+impl Listener for Remarks {
+    fn step(&self, _: u64, _: u64, _: &str) {}
+
+    fn remark(&self, text: &str) {
+        self.0.lock().unwrap().push(text.to_owned());
+    }
+
+    fn interrupted(&self) -> bool {
+        false
+    }
+}
+
+/// A fit, and what it remarks about the tolerance.
+fn fitted(layout: &QuadLayout, parameters: &Parameters) -> (SplineSurface, Vec<String>) {
+    let remarks = Arc::new(Remarks::default());
+    let surface = fit(layout, parameters, &Units::none(), &Progress::new(remarks.clone())).unwrap();
+    let mut all = std::mem::take(&mut *remarks.0.lock().unwrap());
+    all.retain(|text| text.starts_with("beyond the tolerance"));
+    (surface, all)
+}
+
+/// The largest distance of a vertex or of the middle of a face of one mesh from the other, both ways, over the diagonal.
+fn deviation(layout: &QuadLayout, surface: &SplineSurface) -> f64 {
+    let mesh = &layout.part.mesh;
+    let other = surface.tessellate(2e-5 * mesh.diagonal());
+    let one_way = |from: &topipe_mesh::TriangleMesh, to: &topipe_mesh::TriangleMesh| {
+        let index = SurfaceIndex::build(to);
+        let middles = from.faces().map(|f| from.corners(f).into_iter().sum::<topipe_mesh::DVec3>() / 3.0);
+        let points = from.positions.iter().copied().chain(middles);
+        points.map(|p| index.nearest(p).unwrap().distance).fold(0.0, f64::max)
+    };
+    one_way(mesh, &other).max(one_way(&other, mesh)) / mesh.diagonal()
+}
+
+#[test]
+fn patches_are_divided_until_the_tolerance_holds() {
+    // Knots alone do not keep it.
+    let layout = fixture("y-form");
+    let tolerance = 8.5e-4;
+    let parameters = Parameters { tolerance, ..Default::default() };
+    let (knots_only, remarks) = fitted(&layout, &Parameters { divisions: 0, ..parameters.clone() });
+    assert_eq!(remarks, Vec::<String>::new());
+    assert_eq!(knots_only.patches.len(), layout.quads.len());
+    let before = deviation(&layout, &knots_only);
+    assert!(before > 1.1 * tolerance, "{before}");
+
+    let (surface, remarks) = fitted(&layout, &parameters);
+    let after = deviation(&layout, &surface);
+    // Between the points at which the fit looks the surface may be a little farther.
+    assert!(after < 1.05 * tolerance, "{after} after {before}: {remarks:?}");
+    let patches = layout.quads.len()..layout.quads.len() * 3 / 2;
+    assert!(patches.contains(&surface.patches.len()), "{}", surface.patches.len());
+    assert!(!remarks.is_empty() && !remarks.iter().any(|text| text.contains("nothing more")), "{remarks:?}");
+    assert!(largest_jump(&surface) <= 0.1);
+    let mesh = surface.tessellate(1e-3 * layout.part.mesh.diagonal());
+    assert_eq!(Connectivity::build(&mesh).unwrap().genus(&mesh), Some(0));
+
+    // In mm it is the same.
+    let in_mm = Parameters {
+        tolerance: 1.0,
+        tolerance_mm: Some(tolerance * layout.part.mesh.diagonal()),
+        ..parameters
+    };
+    assert!(fitted(&layout, &in_mm).0 == surface);
+}
+
+#[test]
+fn a_tolerance_that_holds_divides_nothing() {
+    let layout = fixture("y-form");
+    let (surface, remarks) = fitted(&layout, &Parameters::default());
+    assert_eq!(remarks, Vec::<String>::new());
+    assert_eq!(surface.patches.len(), layout.quads.len());
+    let parameters = Parameters { divisions: 0, ..Default::default() };
+    assert!(fitted(&layout, &parameters).0 == surface);
+}
+
+#[test]
+fn a_tolerance_that_cannot_be_held_ends_and_says_where() {
+    let layout = fixture("monster-lite");
+    let parameters = Parameters { tolerance: 1e-6, divisions: 1, refinements: 0, ..Default::default() };
+    let (surface, remarks) = fitted(&layout, &parameters);
+    let last = remarks.last().unwrap();
+    assert!(last.contains(" places, farthest ") && last.contains("mm at ("), "{last}");
+    assert!(last.ends_with("nothing more"), "{last}");
+    let mesh = surface.tessellate(1e-3 * layout.part.mesh.diagonal());
+    assert_eq!(Connectivity::build(&mesh).unwrap().genus(&mesh), Some(1));
+}
