@@ -1,9 +1,10 @@
-//! More quads around a vertex, and nothing else changed.
+//! More quads around a vertex, and the others as they are.
 //!
 //! The edges at the vertex are halved, and each quad around it becomes three: from a point inside it paths lead to the two middles
 //! and to the corner opposite. What lies around these quads keeps its sides, so that a division does not run on through the layout as
 //! it does where quads are halved from side to side. The quad at the vertex is about half as wide as before. The angle at the
-//! corner opposite is shared by two quads; the new vertices and those around them are relaxed afterwards.
+//! corner opposite is shared by two quads; the new vertices and those around them are relaxed afterwards, by which quads beside them
+//! change their shape a little.
 //!
 //! Source: the template for one marked corner in the refinement of quadrilateral meshes (Schneiders 1996).
 

@@ -193,7 +193,7 @@ fn in_order(mut suspects: Vec<Suspect>) -> Vec<Suspect> {
     suspects
 }
 
-/// From this share of the limit on patches were drawn to samples.
+/// From this share of the limit on patches may have been drawn to samples; none were before, see [`crate::Parameters::tolerance`].
 const DRAWN: f64 = 0.5;
 
 /// A point of a grid that is farther than this share of the limit may have one beyond the limit beside it.
