@@ -27,30 +27,40 @@ const ATTEMPTS: usize = 6;
 const EFFORTS: [Effort; 5] =
     [Effort::Improve, Effort::Improve, Effort::Improve, Effort::Search, Effort::Search];
 
-/// Divides quads: for each of the wanted places those around one of its macro-vertices, the first that can be divided. It can where
-/// no quad around it is divided already for an earlier place, and no corner of the new quads lies outside 15 to 165 degrees.
+/// A layout with quads divided.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Division {
+    /// The finer layout.
+    pub layout: QuadLayout,
+    /// For each of the wanted places the macro-vertex around which quads were divided. Several places may have one in common.
+    pub vertices: Vec<Option<u32>>,
+}
+
+/// Divides quads: for each of the wanted places those around one of its macro-vertices, the first that can be divided or is divided
+/// for an earlier place. It can where no quad around it is divided around another vertex, and no corner of the new quads lies outside
+/// 15 to 165 degrees.
 ///
-/// Returns the finer layout and the number of vertices around which it is finer; none where there is none. Vertices, edges and quads
-/// of the given layout keep their numbers, an edge that is halved for its first half and a quad for the piece at the vertex.
+/// None where nothing is divided. Vertices, edges and quads of the given layout keep their numbers, an edge that is halved for its
+/// first half and a quad for the piece at the vertex; so do vertices of the mesh, and faces as long as they are not cut.
 ///
 /// Not guaranteed: that every place gets a division. Provenance in the finer layout refers to the mesh of the given one.
 pub fn divide(
     layout: &QuadLayout,
     wanted: &[Vec<u32>],
     progress: &Progress,
-) -> Result<Option<(QuadLayout, usize)>, QuadMatchingError> {
+) -> Result<Option<Division>, QuadMatchingError> {
     let around = around(layout, wanted);
     let mut rejected: FxHashSet<u32> = FxHashSet::default();
     for _ in 0..ATTEMPTS {
         progress.check()?;
-        let stars = stars(layout, &around, wanted, &rejected);
+        let (stars, vertices) = stars(layout, &around, wanted, &rejected);
         if stars.is_empty() {
             break;
         }
         let finer = divided(layout, &stars, progress)?;
         let outside = outside(&finer, layout.quads.len(), &stars);
         if outside.is_empty() {
-            return Ok(Some((finer, stars.len())));
+            return Ok(Some(Division { layout: finer, vertices }));
         }
         rejected.extend(outside);
     }
@@ -77,15 +87,15 @@ fn around(layout: &QuadLayout, wanted: &[Vec<u32>]) -> FxHashMap<u32, Vec<(usize
     around
 }
 
-/// The stars that are divided together: no two have a quad in common.
+/// The stars that are divided together, and for each place the vertex of one: no two have a quad in common.
 fn stars<'a>(
     layout: &QuadLayout,
     around: &'a FxHashMap<u32, Vec<(usize, usize)>>,
     wanted: &[Vec<u32>],
     rejected: &FxHashSet<u32>,
-) -> Vec<Star<'a>> {
+) -> (Vec<Star<'a>>, Vec<Option<u32>>) {
     let mut taken: FxHashSet<usize> = FxHashSet::default();
-    let mut star = |vertex: u32| {
+    let star = |vertex: u32, taken: &mut FxHashSet<usize>| {
         let quads = around.get(&vertex)?;
         let mut own: FxHashSet<usize> = FxHashSet::default();
         // A quad with two corners at the vertex has no one corner opposite.
@@ -99,10 +109,20 @@ fn stars<'a>(
             Star { vertex, quads }
         })
     };
-    let allowed = |place: &'_ Vec<u32>| {
-        place.iter().copied().filter(|vertex| !rejected.contains(vertex)).collect::<Vec<u32>>()
+    let mut stars: Vec<Star<'a>> = Vec::new();
+    let mut centers: FxHashSet<u32> = FxHashSet::default();
+    let mut divides = |vertex: u32| {
+        if rejected.contains(&vertex) || centers.contains(&vertex) {
+            return centers.contains(&vertex);
+        }
+        let star = star(vertex, &mut taken);
+        centers.extend(star.as_ref().map(|star| star.vertex));
+        let is_one = star.is_some();
+        stars.extend(star);
+        is_one
     };
-    wanted.iter().filter_map(|place| allowed(place).into_iter().find_map(&mut star)).collect()
+    let vertices = wanted.iter().map(|place| place.iter().copied().find(|&vertex| divides(vertex))).collect();
+    (stars, vertices)
 }
 
 /// The sides of a quad that meet at its corner `k`: the one that leaves it and the one that ends there.

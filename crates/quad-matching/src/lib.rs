@@ -36,7 +36,7 @@ mod spokes;
 mod straighten;
 mod verify;
 
-pub use divide::divide;
+pub use divide::{Division, divide};
 pub use dual::match_quads;
 pub use error::QuadMatchingError;
 pub use layout::{MacroEdge, QuadLayout, RegionFace, Side};

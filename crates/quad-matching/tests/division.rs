@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use topipe_mesh::Part;
 use topipe_mesh::import::{ImportOptions, Source, read_source};
 use topipe_progress::Progress;
-use topipe_quad_matching::{QuadLayout, divide, match_quads, verify};
+use topipe_quad_matching::{Division, QuadLayout, divide, match_quads, verify};
 
 fn layout(name: &str) -> QuadLayout {
     let stem = format!("{}/../../fixtures/{name}/{name}", env!("CARGO_MANIFEST_DIR"));
@@ -41,8 +41,11 @@ fn some(step: usize) -> impl Fn(&QuadLayout) -> Vec<Vec<u32>> {
     move |layout| (0..layout.vertices.len() as u32).step_by(step).map(|v| vec![v]).collect()
 }
 
+/// A division, and around how many vertices.
 fn divided(layout: &QuadLayout, wanted: &[Vec<u32>]) -> (QuadLayout, usize) {
-    divide(layout, wanted, &Progress::silent()).unwrap().unwrap()
+    let Division { layout, vertices } = divide(layout, wanted, &Progress::silent()).unwrap().unwrap();
+    let vertices: BTreeSet<u32> = vertices.into_iter().flatten().collect();
+    (layout, vertices.len())
 }
 
 #[test]
@@ -74,11 +77,14 @@ fn only_what_lies_around_the_vertex_changes() {
         |v: usize| coarse.edges.iter().any(|edge| edge.feature.is_some() && edge.ends.contains(&(v as u32)));
     let mut tried = [0, 0];
     for v in (0..at.len()).step_by(at.len() / 12).filter(|&v| !at[v].is_empty()) {
-        let Some((fine, count)) = divide(&coarse, &[vec![v as u32]], &Progress::silent()).unwrap() else {
+        let wanted = [vec![v as u32]];
+        let Some(Division { layout: fine, vertices }) =
+            divide(&coarse, &wanted, &Progress::silent()).unwrap()
+        else {
             continue;
         };
         tried[usize::from(on_border(v))] += 1;
-        assert_eq!(count, 1);
+        assert_eq!(vertices, [Some(v as u32)]);
         let own: BTreeSet<usize> = at[v].iter().map(|corner| corner.0).collect();
         assert_eq!(fine.quads.len(), coarse.quads.len() + 2 * own.len());
         // Vertices in the middles of the edges there and inside of each quad.
@@ -124,12 +130,13 @@ fn only_what_lies_around_the_vertex_changes() {
 #[test]
 fn quads_are_divided_for_one_vertex_only() {
     let coarse = layout("y-form");
-    // All corners of one quad, as places of their own: the first is taken.
-    let wanted: Vec<Vec<u32>> = coarse.corners(7).map(|v| vec![v]).to_vec();
-    let (fine, count) = divided(&coarse, &wanted);
-    assert_eq!(count, 1);
-    let (alone, _) = divided(&coarse, &wanted[..1]);
-    assert_eq!(fine, alone);
+    // All corners of one quad, as places of their own: the first is taken. A place that wants it too has it.
+    let corners = coarse.corners(7);
+    let mut wanted: Vec<Vec<u32>> = corners.map(|v| vec![v]).to_vec();
+    wanted.push(vec![corners[1], corners[0]]);
+    let both = divide(&coarse, &wanted, &Progress::silent()).unwrap().unwrap();
+    assert_eq!(both.vertices, [Some(corners[0]), None, None, None, Some(corners[0])]);
+    assert_eq!(both.layout, divided(&coarse, &wanted[..1]).0);
     // And where all stars are wanted no two have a quad in common.
     let (fine, count) = divided(&coarse, &some(1)(&coarse));
     assert!(count > 50 && fine.quads.len() <= 3 * coarse.quads.len(), "{count}");

@@ -12,7 +12,9 @@ use crate::patches::{APART, Fitted};
 use crate::refinement::{curve_points, off};
 use crate::samples::{PatchSamples, Sample, arc_length};
 use crate::setting::Setting;
+use crate::surface::extent;
 use rayon::prelude::*;
+use std::sync::Arc;
 use topipe_mesh::DVec3;
 use topipe_mesh::spatial::{SurfaceIndex, Trail};
 use topipe_quad_matching::QuadLayout;
@@ -49,8 +51,8 @@ impl Beyond {
 pub(crate) struct Measured<'a> {
     pub(crate) setting: &'a Setting<'a>,
     pub(crate) network: &'a Network,
-    pub(crate) fitted: &'a [Fitted],
-    pub(crate) samples: &'a [PatchSamples],
+    pub(crate) fitted: &'a [Arc<Fitted>],
+    pub(crate) samples: &'a [Arc<PatchSamples>],
     /// Of the mesh.
     pub(crate) index: &'a SurfaceIndex,
 }
@@ -67,20 +69,34 @@ struct Suspect {
 impl Measured<'_> {
     /// Where the distance is more than `limit`, mm, the farthest first: in a patch or along an edge at most one place for each way.
     pub(crate) fn beyond(&self, limit: f64) -> Vec<Beyond> {
+        self.beyond_after(&[], &vec![false; self.fitted.len()], limit)
+    }
+
+    /// The same where it is known what was found `before`, and which patches are the same.
+    pub(crate) fn beyond_after(&self, before: &[Beyond], same: &[bool], limit: f64) -> Vec<Beyond> {
+        let around = Around::new(self.setting.layout);
+        // Nothing is measured against other patches than those around.
+        let settled: Vec<bool> = (0..same.len())
+            .into_par_iter()
+            .map(|quad| around.quads(self.setting.layout, quad).iter().all(|&q| same[q as usize]))
+            .collect();
+        let open = |quad: usize| !settled[quad];
         let edges = (0..self.setting.roles.len()).into_par_iter();
+        let edges = edges.filter(|&e| self.is_inner(e) && open(self.setting.beside[e][0].0 as usize));
         let (curves, mut suspects): (Vec<Option<Beyond>>, Vec<Vec<Suspect>>) =
-            edges.filter(|&e| self.is_inner(e)).map(|e| self.edge(e, limit)).unzip();
+            edges.map(|e| self.edge(e, limit)).unzip();
         let mut found: Vec<Beyond> = curves.into_iter().flatten().collect();
+        found.extend(before.iter().filter(|place| settled.get(place.quad as usize) == Some(&true)));
         // Drawn to samples, see [`crate::reweighting`].
-        let drawn: Vec<usize> =
-            (0..self.fitted.len()).filter(|&quad| self.fitted[quad].farthest > DRAWN * limit).collect();
+        let drawn: Vec<usize> = (0..self.fitted.len())
+            .filter(|&quad| open(quad) && self.fitted[quad].farthest > DRAWN * limit)
+            .collect();
         found
             .par_extend(drawn.into_par_iter().with_max_len(APART).filter_map(|quad| self.swing(quad, limit)));
-        let patches = (0..self.fitted.len()).into_par_iter();
+        let patches = (0..self.fitted.len()).into_par_iter().filter(|&quad| open(quad));
         suspects.par_extend(patches.map(|quad| self.far_samples(quad, limit)));
         suspects.retain(|suspects| !suspects.is_empty());
         if !suspects.is_empty() {
-            let around = Around::new(self.setting.layout);
             let farthest = |suspects: &Vec<Suspect>| {
                 let mut farthest: Option<Beyond> = None;
                 for suspect in suspects {
@@ -88,8 +104,7 @@ impl Measured<'_> {
                     if suspect.most <= least {
                         break;
                     }
-                    let distance = around.distance(self, suspect);
-                    if distance > least {
+                    if let Some(distance) = around.distance_beyond(self, suspect, least) {
                         let Suspect { quad, place, point, .. } = *suspect;
                         farthest = Some(Beyond { distance, quad, place, point });
                     }
@@ -215,14 +230,30 @@ impl Around {
         Self(quads)
     }
 
-    /// The distance of a point from its patch and those around it, mm, or a little more.
-    fn distance(&self, measured: &Measured<'_>, suspect: &Suspect) -> f64 {
-        let corners = measured.setting.layout.corners(suspect.quad as usize);
+    /// A quad and those around it, ascending.
+    fn quads(&self, layout: &QuadLayout, quad: usize) -> Vec<u32> {
+        let corners = layout.corners(quad);
         let mut quads: Vec<u32> = corners.iter().flat_map(|&v| &self.0[v as usize]).copied().collect();
         quads.sort_unstable();
         quads.dedup();
-        let distances = quads.into_iter().map(|q| distance(&measured.fitted[q as usize].net, suspect.point));
-        distances.fold(f64::INFINITY, f64::min)
+        quads
+    }
+
+    /// The distance of a point from its patch and those around it, mm, or a little more, where it is more than `limit`.
+    fn distance_beyond(&self, measured: &Measured<'_>, suspect: &Suspect, limit: f64) -> Option<f64> {
+        let mut least = suspect.most;
+        for quad in self.quads(measured.setting.layout, suspect.quad as usize) {
+            let net = &measured.fitted[quad as usize].net;
+            // A patch lies in the box around its control points.
+            let [low, high] = extent(net.control.iter().copied());
+            if suspect.point.clamp(low, high).distance(suspect.point) < least {
+                least = least.min(distance(net, suspect.point));
+            }
+            if least <= limit {
+                return None;
+            }
+        }
+        Some(least)
     }
 }
 
@@ -252,4 +283,76 @@ fn beside([u, v]: [f64; 2], step: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
         let [i, j] = [f64::from(k % 3) - 1.0, f64::from(k / 3) - 1.0];
         [u + i * step[0], v + j * step[1]].map(|x: f64| x.clamp(0.0, 1.0))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Parameters;
+    use crate::setting::tests::layout;
+    use crate::tangent_fit::{Fit, Given};
+    use topipe_progress::{Progress, Units};
+    use topipe_quad_matching::{Division, divide};
+
+    /// A swing of a patch is found where points side by side find it, and samples that leave a patch are.
+    #[test]
+    fn the_farthest_point_of_a_patch_is_found() {
+        let (layout, samples) = layout("y-form");
+        let (parameters, units, progress) = (Parameters::default(), Units::none(), Progress::silent());
+        let given = Given { parameters: &parameters, units: &units, progress: &progress };
+        let fit = Fit::new(&layout, given).unwrap();
+        let mesh = &layout.part.mesh;
+        let limit = parameters.largest_distance(mesh);
+        let index = SurfaceIndex::build(mesh);
+        let (setting, network) = (&fit.setting, fit.network());
+        let farthest = |fitted: &[Arc<Fitted>]| {
+            Measured { setting, network, fitted, samples: &samples, index: &index }.beyond(limit)
+        };
+        assert_eq!(farthest(fit.fitted()), []);
+        for quad in (0..layout.quads.len()).step_by(layout.quads.len() / 5) {
+            let mut fitted = fit.fitted().to_vec();
+            let bent = Arc::make_mut(&mut fitted[quad]);
+            let size = mesh.diagonal() / 20.0;
+            let normal = bent.net.evaluate(0.5, 0.5).normal();
+            let (width, height) = (bent.net.basis_u.len(), bent.net.basis_v.len());
+            // One control point, so that it swings between places of the grid.
+            bent.net.control[height / 2 * width + width / 2] += size * normal;
+            bent.farthest = bent.net.farthest(&samples[quad]);
+            let patch = bent.net.clone();
+            let places = (0..=200u32).flat_map(|j| (0..=200u32).map(move |i| [i, j]));
+            let points = places.map(|place| place.map(|k| f64::from(k) / 200.0));
+            let distance = |[u, v]: [f64; 2]| index.nearest(patch.position(u, v)).unwrap().distance;
+            let expected = points.map(distance).fold(0.0, f64::max);
+            assert!(expected > 1.5 * limit, "{expected} for {limit}");
+            let found = farthest(&fitted);
+            // The patches beside it stay where they are.
+            assert!(found.iter().all(|place| place.quad as usize == quad), "{found:?}");
+            assert!(
+                (0.97 * expected..1.001 * expected).contains(&found[0].distance),
+                "{found:?}, {expected}"
+            );
+            let [u, v] = found[0].place;
+            assert!((distance([u, v]) - found[0].distance).abs() < 1e-12 * expected);
+            assert!(found.is_sorted_by(|a, b| a.distance >= b.distance));
+        }
+    }
+
+    /// What is known of patches that are the same is what would be found again.
+    #[test]
+    fn places_are_carried_over_where_nothing_has_changed() {
+        let (layout, _) = layout("y-form");
+        let parameters = Parameters { tolerance: 7e-4, ..Default::default() };
+        let (units, progress) = (Units::none(), Progress::silent());
+        let given = Given { parameters: &parameters, units: &units, progress: &progress };
+        let fit = Fit::new(&layout, given).unwrap();
+        assert!(fit.beyond.len() > 5, "{}", fit.beyond.len());
+        let wanted = [fit.beyond[0].corners(&layout)];
+        let Division { layout: finer, .. } = divide(&layout, &wanted, &progress).unwrap().unwrap();
+        let divided = Fit::divided(&finer, &fit, given).unwrap();
+        let same = (0..finer.quads.len()).filter(|&quad| divided.has_same_patch(&fit, quad)).count();
+        assert!((layout.quads.len() / 2..layout.quads.len() - 3).contains(&same), "{same}");
+        let again = divided.measured_anew(&parameters);
+        assert_eq!(divided.beyond, again);
+        assert!(fit.beyond.iter().filter(|place| again.contains(place)).count() > 2);
+    }
 }

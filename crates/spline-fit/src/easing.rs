@@ -11,6 +11,7 @@ use crate::patches::{APART, Fitted};
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
 use rayon::prelude::*;
+use std::sync::Arc;
 use topipe_progress::Progress;
 
 /// What was eased.
@@ -37,18 +38,19 @@ impl Easing {
     }
 
     /// Changes the factors on the radii of the local fits, `closer`, one per edge: in the first round those along edges of folded
-    /// patches are 1 again, in the second those that have unfolded nothing are put back. False when nothing changes.
+    /// patches are 1 again, if the patches are `open`, in the second those that have unfolded nothing are put back. False when nothing changes.
     pub(crate) fn next(
         &mut self,
         closer: &mut [f64],
+        open: &[bool],
         setting: &Setting<'_>,
-        fitted: &[Fitted],
-        samples: &[PatchSamples],
+        fitted: &[Arc<Fitted>],
+        samples: &[Arc<PatchSamples>],
         progress: &Progress,
     ) -> bool {
         self.rounds += 1;
         match self.rounds {
-            1 => self.ease(closer, setting, fitted, samples, progress),
+            1 => self.ease(closer, open, setting, fitted, samples, progress),
             2 => self.take_back(closer, setting, fitted, samples),
             _ => false,
         }
@@ -57,15 +59,18 @@ impl Easing {
     fn ease(
         &mut self,
         closer: &mut [f64],
+        open: &[bool],
         setting: &Setting<'_>,
-        fitted: &[Fitted],
-        samples: &[PatchSamples],
+        fitted: &[Arc<Fitted>],
+        samples: &[Arc<PatchSamples>],
         progress: &Progress,
     ) -> bool {
-        let around = Around::new(setting, (0..closer.len()).filter(|&e| closer[e] < 1.0));
+        let is_open = |e: usize| setting.beside[e].iter().any(|&(quad, _)| open[quad as usize]);
+        let around = Around::new(setting, (0..closer.len()).filter(|&e| closer[e] < 1.0 && is_open(e)));
         let folded = around.folded(fitted, samples);
         let mut beside = vec![false; closer.len()];
-        for (sides, _) in setting.layout.quads.iter().zip(&folded).filter(|(_, share)| **share > 0.0) {
+        let patches = setting.layout.quads.iter().zip(folded.iter().zip(open));
+        for (sides, _) in patches.filter(|(_, (share, open))| **share > 0.0 && **open) {
             sides.iter().for_each(|side| beside[side.edge as usize] = true);
         }
         for (edge, closer) in closer.iter_mut().enumerate().filter(|(e, closer)| beside[*e] && **closer < 1.0)
@@ -84,8 +89,8 @@ impl Easing {
         &self,
         closer: &mut [f64],
         setting: &Setting<'_>,
-        fitted: &[Fitted],
-        samples: &[PatchSamples],
+        fitted: &[Arc<Fitted>],
+        samples: &[Arc<PatchSamples>],
     ) -> bool {
         let around = Around::new(setting, self.eased.iter().map(|eased| eased.edge));
         let folded = around.folded(fitted, samples);
@@ -129,7 +134,7 @@ impl Around {
     }
 
     /// The share of each patch that is turned over; 0 for those not looked at.
-    fn folded(&self, fitted: &[Fitted], samples: &[PatchSamples]) -> Vec<f64> {
+    fn folded(&self, fitted: &[Arc<Fitted>], samples: &[Arc<PatchSamples>]) -> Vec<f64> {
         let share = |&quad: &usize| fitted[quad].net.folded(&fitted[quad].corners, &samples[quad]);
         let looked_at: Vec<usize> = (0..fitted.len()).filter(|&quad| self.looked_at[quad]).collect();
         let mut folded = vec![0.0; fitted.len()];

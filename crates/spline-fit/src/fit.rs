@@ -2,9 +2,10 @@
 
 use crate::parameters::Continuity;
 use crate::samples::{PatchSamples, faces_by_quad, sample};
-use crate::setting::Setting;
+use crate::tangent_fit::Given;
 use crate::{Parameters, SplineFitError, SplineSurface};
 use rayon::prelude::*;
+use std::sync::Arc;
 use topipe_progress::{Progress, UnitKey, Units};
 use topipe_quad_matching::QuadLayout;
 
@@ -17,63 +18,49 @@ pub fn fit(
     units: &Units,
     progress: &Progress,
 ) -> Result<SplineSurface, SplineFitError> {
+    parameters.basis()?;
     match parameters.continuity {
         Continuity::Position => {
-            parameters.basis()?;
             check(layout)?;
-            crate::position_fit::fit(layout, samples(layout)?, parameters, progress)
+            let samples = samples(layout, |_| None)?.into_iter().map(Arc::unwrap_or_clone).collect();
+            crate::position_fit::fit(layout, samples, parameters, progress)
         }
-        Continuity::Tangent => {
-            let fit = |layout: &QuadLayout| {
-                let (setting, samples) = tangent_setting(layout, parameters)?;
-                crate::tangent_fit::fit(setting, samples, parameters, units, progress)
-            };
-            crate::division::fit_dividing(layout, parameters, fit, progress)
-        }
+        Continuity::Tangent => crate::division::fit_dividing(layout, Given { parameters, units, progress }),
     }
 }
 
 /// The keys of the patches that [`fit`] begins with, found in a small part of its time; none without common tangents.
 /// Patches that are refined have other keys later, which depend on what comes of the first.
 pub fn first_patches(layout: &QuadLayout, parameters: &Parameters) -> Result<Vec<UnitKey>, SplineFitError> {
+    parameters.basis()?;
     match parameters.continuity {
         Continuity::Position => Ok(Vec::new()),
-        Continuity::Tangent => {
-            let (setting, samples) = tangent_setting(layout, parameters)?;
-            crate::tangent_fit::first_patches(setting, &samples, parameters)
-        }
+        Continuity::Tangent => crate::tangent_fit::first_patches(layout, parameters),
     }
 }
 
-/// What the fit with common tangents begins with. Few threads can work on the setting; the others take samples meanwhile.
-fn tangent_setting<'a>(
-    layout: &'a QuadLayout,
-    parameters: &Parameters,
-) -> Result<(Setting<'a>, Vec<PatchSamples>), SplineFitError> {
-    parameters.basis()?;
-    check(layout)?;
-    let (setting, samples) = rayon::join(|| Setting::new(layout), || samples(layout));
-    // The error of the samples first, as if they had been taken first.
-    let samples = samples?;
-    Ok((setting?, samples))
-}
-
-fn samples(layout: &QuadLayout) -> Result<Vec<PatchSamples>, SplineFitError> {
+/// The samples of all quads; what is `kept` of a quad is not taken again.
+pub(crate) fn samples(
+    layout: &QuadLayout,
+    kept: impl Fn(usize) -> Option<Arc<PatchSamples>> + Sync,
+) -> Result<Vec<Arc<PatchSamples>>, SplineFitError> {
     let faces = faces_by_quad(layout);
     (0..layout.quads.len())
         .into_par_iter()
         .map(|quad| {
-            sample(layout, quad, &faces[quad])
+            let taken = || sample(layout, quad, &faces[quad]).map(Arc::new);
+            kept(quad)
+                .or_else(taken)
                 .ok_or_else(|| SplineFitError::Layout(format!("the faces of quad {quad} are not a disk")))
         })
         // The first error in the order of the quads, for any number of threads.
-        .collect::<Vec<Result<PatchSamples, SplineFitError>>>()
+        .collect::<Vec<Result<Arc<PatchSamples>, SplineFitError>>>()
         .into_iter()
         .collect()
 }
 
 /// The parts of a layout's guarantees on which indexing relies.
-fn check(layout: &QuadLayout) -> Result<(), SplineFitError> {
+pub(crate) fn check(layout: &QuadLayout) -> Result<(), SplineFitError> {
     let wrong = |what: &str| Err(SplineFitError::Layout(what.into()));
     let vertices = layout.part.mesh.vertex_count();
     if layout.quads.is_empty() && layout.region_faces.is_empty() {

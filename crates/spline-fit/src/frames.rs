@@ -9,6 +9,7 @@ use crate::samples::PatchSamples;
 use crate::tangents::{spread_around, spread_between};
 use crate::{EdgeCurve, SplineFitError};
 use rayon::prelude::*;
+use std::sync::Arc;
 use topipe_mesh::{DVec3, RegionShape};
 use topipe_quad_matching::QuadLayout;
 
@@ -21,7 +22,7 @@ pub(crate) struct Frame {
 }
 
 /// The frame of a sector and what it depends on, which is the same in many a refinement.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct KnownFrame {
     /// Radii of the local fits along its spokes, mm, and the common tangent of the creases through its vertex.
     from: (Vec<f64>, Option<DVec3>),
@@ -41,7 +42,7 @@ pub(crate) struct Given<'a> {
     pub(crate) layout: &'a QuadLayout,
     pub(crate) roles: &'a [EdgeRole],
     pub(crate) sectors: &'a Sectors,
-    pub(crate) samples: &'a [PatchSamples],
+    pub(crate) samples: &'a [Arc<PatchSamples>],
     /// Curves beside region faces, and the vertices on them.
     pub(crate) curves: &'a [Option<EdgeCurve>],
     pub(crate) vertices: &'a [Option<DVec3>],
@@ -54,7 +55,7 @@ pub(crate) struct Given<'a> {
 impl<'a> Given<'a> {
     /// Points of the given quads' faces, by quad with the ball around them.
     pub(crate) fn of_quads(&self, quads: &[(u32, u8)]) -> Vec<&'a PatchSamples> {
-        quads.iter().map(|&(q, _)| &self.samples[q as usize]).collect()
+        quads.iter().map(|&(q, _)| &*self.samples[q as usize]).collect()
     }
 
     /// The mesh points along a spoke, from its vertex on.

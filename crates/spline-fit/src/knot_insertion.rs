@@ -18,6 +18,7 @@ use crate::ribbon::ribbons;
 use crate::setting::Setting;
 use crate::{Patch, SurfacePoint};
 use rayon::prelude::*;
+use std::sync::Arc;
 use topipe_mesh::{DVec3, RegionShape};
 use topipe_progress::Progress;
 use topipe_quad_matching::QuadLayout;
@@ -40,7 +41,7 @@ const MOST_CELLS: usize = 16_384;
 pub(crate) fn insert_knots(
     setting: &Setting<'_>,
     curves: &[Curve],
-    fitted: &[Fitted],
+    fitted: &[Arc<Fitted>],
     limit: f64,
     progress: &Progress,
 ) -> Vec<Net> {

@@ -1,6 +1,7 @@
 //! Vertices and edges of the fit with tangents: curves that patches share, and the normals along them.
 
 use crate::SplineFitError;
+use crate::common::Common;
 use crate::crease_curves;
 use crate::fans::{EdgeRole, Spoke};
 use crate::frames::{Frames, KnownFrame, crease_tangents};
@@ -9,10 +10,11 @@ use crate::setting::Setting;
 use crate::smooth_curves::{KnownEdge, SmoothCurve, smooth_curve};
 use crate::twist::{Leg, leg, turning};
 use rayon::prelude::*;
+use std::sync::Arc;
 use topipe_mesh::DVec3;
 
 /// A curve and, where patches have tangent planes along it, its normals.
-#[derive(PartialEq)]
+#[derive(Clone, PartialEq)]
 pub(crate) struct Curve {
     pub(crate) control: Vec<DVec3>,
     /// Control points of the normals over the same basis.
@@ -33,6 +35,18 @@ pub(crate) struct KnownFits {
     edges: Vec<KnownEdge>,
 }
 
+impl KnownFits {
+    /// What is known in another setting, for what is the same there.
+    pub(crate) fn carried(&self, setting: &Setting<'_>, common: &Common) -> Self {
+        let frame = |number: &Option<usize>| number.and_then(|number| self.frames.get(number)).cloned();
+        let edge = |e: usize| self.edges.get(e).filter(|_| common.is_curve_known(setting, e)).cloned();
+        Self {
+            frames: common.sectors.iter().map(|number| frame(number).unwrap_or_default()).collect(),
+            edges: (0..setting.roles.len()).map(|e| edge(e).unwrap_or_default()).collect(),
+        }
+    }
+}
+
 /// Vertices and edges.
 pub(crate) struct Network {
     pub(crate) frames: Frames,
@@ -43,7 +57,7 @@ pub(crate) struct Network {
 /// fits that are `known` from another network of this setting are not made again.
 pub(crate) fn network(
     setting: &Setting<'_>,
-    samples: &[PatchSamples],
+    samples: &[Arc<PatchSamples>],
     spans: &[usize],
     reach: &[f64],
     known: &mut KnownFits,

@@ -12,17 +12,21 @@ use crate::unit;
 use crate::{Parameters, SplineFitError};
 use rayon::prelude::*;
 use std::cmp::Reverse;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use topipe_mesh::DVec3;
 use topipe_progress::{Progress, UnitKey, Units};
 
 /// What a patch was fitted to, and what came of it.
+#[derive(Clone)]
 pub(crate) struct Fitted {
     pub(crate) borders: [Border; 4],
     pub(crate) corners: [DVec3; 4],
     pub(crate) net: Net,
     /// The largest distance of a sample, mm.
     pub(crate) farthest: f64,
+    /// Whether it was tried to draw it nearer since, see [`crate::reweighting`].
+    pub(crate) drawn: bool,
     /// The key it is kept under, where patches are kept.
     key: Option<UnitKey>,
 }
@@ -37,7 +41,30 @@ struct Given {
 pub(crate) struct Round {
     pub(crate) network: Network,
     spans: Vec<usize>,
-    pub(crate) fitted: Vec<Fitted>,
+    pub(crate) fitted: Vec<Arc<Fitted>>,
+}
+
+/// What there is before a round.
+pub(crate) struct Before {
+    curves: Vec<Curve>,
+    spans: Vec<usize>,
+    /// None where a patch is not the same.
+    fitted: Vec<Option<Arc<Fitted>>>,
+}
+
+impl From<Round> for Before {
+    fn from(Round { network, spans, fitted }: Round) -> Self {
+        Self { curves: network.curves, spans, fitted: fitted.into_iter().map(Some).collect() }
+    }
+}
+
+impl Round {
+    /// The patches of the `same` quads, for the first round with another layout.
+    pub(crate) fn carried(&self, same: &[bool]) -> Before {
+        let fitted =
+            same.iter().enumerate().map(|(quad, same)| self.fitted.get(quad).filter(|_| *same).cloned());
+        Before { curves: self.network.curves.clone(), spans: self.spans.clone(), fitted: fitted.collect() }
+    }
 }
 
 /// What all patches are fitted with.
@@ -49,7 +76,7 @@ pub(crate) struct Patches<'a> {
     pub(crate) units: &'a Units,
     pub(crate) progress: &'a Progress,
     /// Parameters that the samples of each patch begin with.
-    pub(crate) starts: Vec<Vec<[f64; 2]>>,
+    pub(crate) starts: Vec<Arc<[[f64; 2]]>>,
     /// The keys of the samples as they begin, where patches are kept.
     pub(crate) samples: Vec<UnitKey>,
 }
@@ -90,16 +117,19 @@ impl Patches<'_> {
         network: &Network,
         spans: &[usize],
         corners: &[[DVec3; 4]],
-        before: &Round,
+        before: &Before,
     ) -> Vec<bool> {
         let same: Vec<bool> = (0..spans.len())
             .into_par_iter()
-            .map(|e| spans[e] == before.spans[e] && network.curves[e] == before.network.curves[e])
+            .map(|e| {
+                before.spans.get(e) == Some(&spans[e]) && before.curves.get(e) == Some(&network.curves[e])
+            })
             .collect();
         let patches = self.setting.layout.quads.iter().zip(corners.iter().zip(&before.fitted));
         patches
             .map(|(sides, (corners, before))| {
-                *corners == before.corners && sides.iter().all(|side| same[side.edge as usize])
+                before.as_ref().is_some_and(|before| before.corners == *corners)
+                    && sides.iter().all(|side| same[side.edge as usize])
             })
             .collect()
     }
@@ -108,10 +138,10 @@ impl Patches<'_> {
     /// `before` is taken over where nothing has changed.
     pub(crate) fn fit(
         &self,
-        samples: &mut [PatchSamples],
+        samples: &mut [Arc<PatchSamples>],
         network: Network,
         spans: &[usize],
-        before: Option<Round>,
+        before: Option<Before>,
     ) -> Result<Round, SplineFitError> {
         let Self { setting, parameters, near_enough, units, progress, .. } = *self;
         let layout = setting.layout;
@@ -120,7 +150,7 @@ impl Patches<'_> {
             Some(before) => (self.unchanged(&network, spans, &corners, &before), before.fitted),
             None => (vec![false; samples.len()], Vec::new()),
         };
-        let mut before: Vec<Option<Fitted>> = before.into_iter().map(Some).collect();
+        let mut before: Vec<Option<Arc<Fitted>>> = before;
         before.resize_with(samples.len(), || None);
         // None where it is the same as before.
         let given: Vec<Option<Given>> = unchanged
@@ -144,7 +174,7 @@ impl Patches<'_> {
             })
             .collect();
         tasks.sort_by_key(|task| Reverse(work(&task.2)));
-        let mut made: Vec<(usize, Result<Fitted, SplineFitError>)> = tasks
+        let mut made: Vec<(usize, Result<Arc<Fitted>, SplineFitError>)> = tasks
             .into_par_iter()
             .with_max_len(APART)
             .map(|(quad, samples, borders, key, corners, before)| {
@@ -154,6 +184,7 @@ impl Patches<'_> {
                     if let Some(same) = before.filter(|b| b.borders == borders && b.corners == corners) {
                         return Ok(same);
                     }
+                    let samples = Arc::make_mut(samples);
                     // Each refinement starts from the same parameters: what a patch becomes does not depend on the way there.
                     put(samples, &self.starts[quad]);
                     let task = PatchTask::new(&borders, &corners, &products, parameters, near_enough);
@@ -173,7 +204,7 @@ impl Patches<'_> {
                         progress.step(count, layout.quads.len() as u64, "patches");
                     }
                     let farthest = net.farthest(samples);
-                    Ok(Fitted { borders, corners, net, farthest, key })
+                    Ok(Arc::new(Fitted { borders, corners, net, farthest, drawn: false, key }))
                 };
                 (quad, fitted())
             })
@@ -327,23 +358,23 @@ mod tests {
         let progress = Progress::silent();
         let mut setting = Setting::new(&layout).unwrap();
         setting.make_corners(&samples, 4, &progress);
-        let starts = samples.iter().map(places).collect();
+        let starts = samples.iter().map(|samples| places(samples).into()).collect();
         let (setting, units) = (&setting, &Units::none());
         let near_enough = parameters.near_enough(&layout.part.mesh);
         let (parameters, progress) = (&parameters, &progress);
         let patches = Patches { setting, parameters, near_enough, units, progress, starts, samples: vec![] };
         let refined = layout.edges.len() / 2;
-        let round = |finer: bool, samples: &mut Vec<PatchSamples>, before| {
+        let round = |finer: bool, samples: &mut Vec<Arc<PatchSamples>>, before: Option<Round>| {
             let spans: Vec<usize> =
                 (0..layout.edges.len()).map(|e| if finer && e == refined { 8 } else { 4 }).collect();
             let network =
                 network(setting, samples, &spans, &setting.reach(&spans), &mut KnownFits::default()).unwrap();
-            patches.fit(samples, network, &spans, before).unwrap()
+            patches.fit(samples, network, &spans, before.map(Before::from)).unwrap()
         };
         let (mut moved, mut fresh) = (samples.clone(), samples);
         let mut first = round(false, &mut moved, None);
         // What is taken over keeps the mark.
-        first.fitted.iter_mut().for_each(|fitted| fitted.farthest = -1.0);
+        first.fitted.iter_mut().for_each(|fitted| Arc::make_mut(fitted).farthest = -1.0);
         let second = round(true, &mut moved, Some(first));
         let alone = round(true, &mut fresh, None);
         let ends = layout.edges[refined].ends;

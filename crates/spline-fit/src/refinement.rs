@@ -6,6 +6,7 @@
 //! curve too and its local fits reach less far from then on, but for what [`crate::easing`] takes back at the end.
 
 use crate::Parameters;
+use crate::common::Common;
 use crate::easing::Easing;
 use crate::fans::EdgeRole;
 use crate::hermite;
@@ -14,6 +15,7 @@ use crate::patches::Fitted;
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
 use rayon::prelude::*;
+use std::sync::Arc;
 use topipe_mesh::DVec3;
 use topipe_mesh::spatial::SurfaceIndex;
 use topipe_progress::Progress;
@@ -44,24 +46,51 @@ pub(crate) struct Refinement {
     rounds: u32,
     /// Factors on the radii of the local fits, one per edge.
     closer: Vec<f64>,
+    /// Edges that may become finer by themselves, and patches that may make theirs finer: all, or those that a division has changed.
+    open_edges: Vec<bool>,
+    open_quads: Vec<bool>,
     /// Largest distance, mm.
     tolerance: f64,
     /// Of the mesh; built when it is first needed.
-    index: Option<SurfaceIndex>,
+    index: Option<Arc<SurfaceIndex>>,
     easing: Easing,
 }
 
 impl Refinement {
     /// `index` is one of the mesh of the layout; without it one is built when it is needed.
-    pub(crate) fn new(setting: &Setting<'_>, parameters: &Parameters, index: Option<SurfaceIndex>) -> Self {
+    pub(crate) fn new(
+        setting: &Setting<'_>,
+        parameters: &Parameters,
+        index: Option<Arc<SurfaceIndex>>,
+    ) -> Self {
+        let edges = setting.layout.edges.len();
         Self {
-            spans: vec![parameters.spans as usize; setting.layout.edges.len()],
+            spans: vec![parameters.spans as usize; edges],
             rounds: if parameters.refinements > 0 { parameters.refinements + LATE_ROUNDS } else { 0 },
-            closer: vec![1.0; setting.layout.edges.len()],
+            closer: vec![1.0; edges],
+            open_edges: vec![true; edges],
+            open_quads: vec![true; setting.layout.quads.len()],
             tolerance: parameters.refined_distance(&setting.layout.part.mesh),
             index,
             easing: Easing::default(),
         }
+    }
+
+    /// Goes on after another refinement where a division has changed something; the rest stays as fine as it is.
+    pub(crate) fn after(
+        before: &Self,
+        setting: &Setting<'_>,
+        common: &Common,
+        parameters: &Parameters,
+    ) -> Self {
+        // The mesh has other triangles, but the same surface.
+        let mut refinement = Self::new(setting, parameters, before.index.clone());
+        refinement.open_edges = common.edges.iter().map(|same| !same).collect();
+        refinement.open_quads = common.quads.iter().map(|same| !same).collect();
+        for e in (0..common.edges.len()).filter(|&e| common.edges[e]) {
+            (refinement.spans[e], refinement.closer[e]) = (before.spans[e], before.closer[e]);
+        }
+        refinement
     }
 
     /// Spans of the curves.
@@ -71,7 +100,12 @@ impl Refinement {
 
     /// The index of the mesh.
     pub(crate) fn index(&mut self, setting: &Setting<'_>) -> &SurfaceIndex {
-        self.index.get_or_insert_with(|| SurfaceIndex::build(&setting.layout.part.mesh))
+        self.index.get_or_insert_with(|| Arc::new(SurfaceIndex::build(&setting.layout.part.mesh)))
+    }
+
+    /// The same, if it has been built.
+    pub(crate) fn known_index(&self) -> Option<&SurfaceIndex> {
+        self.index.as_deref()
     }
 
     /// Radii of the local fits, mm, one per edge.
@@ -84,7 +118,7 @@ impl Refinement {
         &mut self,
         setting: &Setting<'_>,
         network: &Network,
-        fitted: &[Fitted],
+        fitted: &[Arc<Fitted>],
         progress: &Progress,
     ) -> bool {
         // Only easing is left.
@@ -107,18 +141,20 @@ impl Refinement {
         let limit = if late { LATE * self.tolerance } else { self.tolerance };
         let mut finer = vec![false; self.spans.len()];
         if !late {
-            for (sides, _) in
-                setting.layout.quads.iter().zip(&residuals).filter(|(_, r)| **r > self.tolerance)
-            {
+            let patches = setting.layout.quads.iter().zip(residuals.iter().zip(&self.open_quads));
+            for (sides, _) in patches.filter(|(_, (r, open))| **r > self.tolerance && **open) {
                 sides.iter().for_each(|side| finer[side.edge as usize] = true);
             }
         }
-        let index = &*self.index.get_or_insert_with(|| SurfaceIndex::build(&setting.layout.part.mesh));
+        let index =
+            self.index.get_or_insert_with(|| Arc::new(SurfaceIndex::build(&setting.layout.part.mesh)));
+        let index = Arc::clone(index);
+        let open = &self.open_edges;
         let far: Vec<bool> = (0..self.spans.len())
             .into_par_iter()
-            .map(|e| is_far(setting, network, index, limit, e))
+            .map(|e| open[e] && is_far(setting, network, &index, limit, e))
             .collect();
-        let very_far = |e: usize| is_far(setting, network, index, VERY_FAR * self.tolerance, e);
+        let very_far = |e: usize| is_far(setting, network, &index, VERY_FAR * self.tolerance, e);
         let finest: Vec<bool> = (0..self.spans.len())
             .into_par_iter()
             .map(|e| late && far[e] && self.spans[e] == MOST_SPANS && very_far(e))
@@ -141,11 +177,11 @@ impl Refinement {
     pub(crate) fn ease(
         &mut self,
         setting: &Setting<'_>,
-        fitted: &[Fitted],
-        samples: &[PatchSamples],
+        fitted: &[Arc<Fitted>],
+        samples: &[Arc<PatchSamples>],
         progress: &Progress,
     ) -> bool {
-        self.easing.next(&mut self.closer, setting, fitted, samples, progress)
+        self.easing.next(&mut self.closer, &self.open_quads, setting, fitted, samples, progress)
     }
 }
 

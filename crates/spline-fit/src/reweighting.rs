@@ -15,6 +15,7 @@ use crate::samples::PatchSamples;
 use crate::unfolding::TIP;
 use rayon::prelude::*;
 use std::cmp::Reverse;
+use std::sync::Arc;
 use topipe_mesh::DVec3;
 
 /// Fits of one patch.
@@ -30,16 +31,18 @@ impl Patches<'_> {
     /// Fits all patches anew that are not within the tolerance. The samples end at their foot points.
     pub(crate) fn draw_nearer(
         &self,
-        fitted: &mut [Fitted],
-        samples: &mut [PatchSamples],
+        fitted: &mut [Arc<Fitted>],
+        samples: &mut [Arc<PatchSamples>],
     ) -> Result<(), SplineFitError> {
         let tolerance = self.parameters.refined_distance(&self.setting.layout.part.mesh);
         let products = products(fitted.iter().map(|f| &f.borders));
-        let mut far: Vec<_> =
-            fitted.iter_mut().zip(samples).filter(|(fitted, _)| fitted.farthest > tolerance).collect();
+        let is_far = |fitted: &Fitted| fitted.farthest > tolerance && !fitted.drawn;
+        let mut far: Vec<_> = fitted.iter_mut().zip(samples).filter(|(fitted, _)| is_far(fitted)).collect();
         far.sort_by_key(|(fitted, _)| Reverse(work(&fitted.borders)));
         far.into_par_iter().with_max_len(APART).try_for_each(|(fitted, samples)| {
             self.progress.check()?;
+            let (fitted, samples) = (Arc::make_mut(fitted), Arc::make_mut(samples));
+            fitted.drawn = true;
             let task = PatchTask::new(
                 &fitted.borders,
                 &fitted.corners,

@@ -7,6 +7,7 @@ use crate::corners::{Corners, corners};
 use crate::fans::{EdgeRole, Sectors, quads_beside};
 use crate::frames::{Given, crease_tangents};
 use crate::samples::PatchSamples;
+use std::sync::Arc;
 use topipe_mesh::{Connectivity, FeatureKind, RegionShape};
 use topipe_progress::Progress;
 use topipe_quad_matching::QuadLayout;
@@ -87,7 +88,7 @@ impl<'a> Setting<'a> {
         self.lengths.iter().zip(spans).map(|(l, &k)| REACH * l / k.min(FINEST_REACH) as f64).collect()
     }
 
-    pub(crate) fn given<'b>(&'b self, samples: &'b [PatchSamples], reach: &'b [f64]) -> Given<'b> {
+    pub(crate) fn given<'b>(&'b self, samples: &'b [Arc<PatchSamples>], reach: &'b [f64]) -> Given<'b> {
         Given {
             layout: self.layout,
             roles: &self.roles,
@@ -101,7 +102,7 @@ impl<'a> Setting<'a> {
     }
 
     /// Gives up tangency where the mesh has corners.
-    pub(crate) fn make_corners(&mut self, samples: &[PatchSamples], spans: usize, progress: &Progress) {
+    pub(crate) fn make_corners(&mut self, samples: &[Arc<PatchSamples>], spans: usize, progress: &Progress) {
         let reach = self.reach(&vec![spans; self.lengths.len()]);
         let mut creases = 0;
         // A crease may end at another border, and need another one there.
@@ -140,7 +141,7 @@ pub(crate) mod tests {
     use topipe_progress::Progress;
 
     /// The layout of a part among the fixtures, with what is fitted.
-    pub(crate) fn layout(name: &str) -> (QuadLayout, Vec<PatchSamples>) {
+    pub(crate) fn layout(name: &str) -> (QuadLayout, Vec<Arc<PatchSamples>>) {
         let place = format!("{}/../../fixtures/{name}/{name}", env!("CARGO_MANIFEST_DIR"));
         let silent = Progress::silent();
         let [bytes, labels] =
@@ -152,7 +153,7 @@ pub(crate) mod tests {
         let layout = topipe_quad_matching::match_quads(&tiling, &Default::default(), &silent).unwrap();
         let faces = faces_by_quad(&layout);
         let samples = faces.iter().enumerate().map(|(quad, faces)| sample(&layout, quad, faces).unwrap());
-        let samples = samples.collect();
+        let samples = samples.map(Arc::new).collect();
         (layout, samples)
     }
 

@@ -45,7 +45,7 @@ impl SmoothCurve {
 
 /// The local fits at the inner breaks of an edge, which are the same for each refinement in which it has the same spans and
 /// their radius is the same.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 struct InnerFits {
     spans: usize,
     reach: f64,
@@ -62,7 +62,7 @@ struct CurveInput {
 }
 
 /// What was found for an edge before: rounds of refinement change few edges.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct KnownEdge {
     inner: InnerFits,
     curve: Option<(CurveInput, SmoothCurve)>,

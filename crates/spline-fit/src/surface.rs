@@ -184,6 +184,11 @@ impl Column {
     }
 }
 
+/// The corners of the box around points.
+pub(crate) fn extent(points: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
+    points.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

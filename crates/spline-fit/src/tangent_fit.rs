@@ -9,103 +9,243 @@
 //! Borders of region faces are given: their curves lie on the shapes, and where the mesh meets a shape smoothly the
 //! patch takes its normals along the border from the shape.
 use crate::beyond::{Beyond, Measured};
+use crate::common::{Common, same_quads};
+use crate::fit::{check, samples};
 use crate::hermite;
 use crate::knot_insertion::insert_knots;
 use crate::network::{KnownFits, Network, network};
 use crate::patch_fit::Net;
-use crate::patches::{Patches, Round, places};
+use crate::patches::{Before, Patches, Round, places};
 use crate::refinement::Refinement;
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
 use crate::simplify::simplify;
+use crate::surface::extent;
 use crate::unit::key_of;
 use crate::{CurveShape, EdgeCurve, Parameters, Patch, PatchSide, SplineFitError, SplineSurface};
 use rayon::prelude::*;
+use std::sync::Arc;
+use topipe_mesh::DVec3;
 use topipe_mesh::spatial::SurfaceIndex;
 use topipe_progress::{Progress, UnitKey, Units};
 use topipe_quad_matching::QuadLayout;
 
-/// What the fit to a layout has come to.
-pub(crate) struct Outcome {
-    pub(crate) surface: SplineSurface,
-    /// Where it is beyond the tolerance, the farthest first; not looked for where patches are not to be divided.
-    pub(crate) beyond: Vec<Beyond>,
-    /// See [`Parameters::largest_distance`], mm.
-    pub(crate) tolerance: f64,
+/// What all fits of a run are made with.
+#[derive(Clone, Copy)]
+pub(crate) struct Given<'a> {
+    pub(crate) parameters: &'a Parameters,
+    pub(crate) units: &'a Units,
+    pub(crate) progress: &'a Progress,
 }
 
-/// Fits a surface whose patches meet with common tangents off the features.
-pub(crate) fn fit(
-    mut setting: Setting<'_>,
-    mut samples: Vec<PatchSamples>,
-    parameters: &Parameters,
-    units: &Units,
-    progress: &Progress,
-) -> Result<Outcome, SplineFitError> {
-    let (layout, spans) = (setting.layout, parameters.spans as usize);
-    // Building the index is work for one thread.
-    let (index, ()) = rayon::join(
-        || (parameters.refinements > 0).then(|| SurfaceIndex::build(&layout.part.mesh)),
-        || setting.make_corners(&samples, spans, progress),
-    );
-    let setting = setting;
-    let mut refinement = Refinement::new(&setting, parameters, index);
-    let starts = samples.par_iter().map(places).collect();
-    let keys = if units.are_kept() { samples.par_iter().map(key_of).collect() } else { Vec::new() };
-    let near_enough = parameters.near_enough(&layout.part.mesh);
-    let patches =
-        Patches { setting: &setting, parameters, near_enough, units, progress, starts, samples: keys };
-    let mut before: Option<Round> = None;
-    let mut known = KnownFits::default();
-    loop {
-        progress.check()?;
-        let network =
-            network(&setting, &samples, refinement.spans(), &refinement.reach(&setting), &mut known)?;
-        let round = patches.fit(&mut samples, network, refinement.spans(), before)?;
-        if !refinement.next(&setting, &round.network, &round.fitted, progress)
-            && !refinement.ease(&setting, &round.fitted, &samples, progress)
-        {
-            let Round { network, mut fitted, .. } = round;
-            patches.draw_nearer(&mut fitted, &mut samples)?;
-            let tolerance = parameters.largest_distance(&layout.part.mesh);
-            let index = (parameters.divisions > 0).then(|| refinement.index(&setting));
-            let measured = index.map(|index| Measured {
-                setting: &setting,
-                network: &network,
-                fitted: &fitted,
-                samples: &samples,
-                index,
-            });
-            // Knots come in rounds that not all threads are busy in.
-            let (beyond, nets) = rayon::join(
-                || measured.map_or_else(Vec::new, |measured| measured.beyond(tolerance)),
-                || insert_knots(&setting, &network.curves, &fitted, parameters.max_normal_jump, progress),
-            );
-            let mut surface = assemble(&setting, network, nets);
-            simplify(&mut surface, setting.borders.tolerance);
-            return Ok(Outcome { surface, beyond, tolerance });
+/// A fit of curves and patches to a layout, without the knots that are inserted where normals turn fast.
+pub(crate) struct Fit<'a> {
+    pub(crate) setting: Setting<'a>,
+    /// At their foot points.
+    samples: Vec<Arc<PatchSamples>>,
+    /// Parameters that the samples of each patch begin with.
+    starts: Vec<Arc<[[f64; 2]]>>,
+    /// The keys of the samples as they begin, where patches are kept.
+    keys: Vec<UnitKey>,
+    refinement: Refinement,
+    known: KnownFits,
+    round: Round,
+    /// Where it is beyond the tolerance, the farthest first; not looked for where patches are not to be divided.
+    pub(crate) beyond: Vec<Beyond>,
+    /// With knots, if they were inserted already.
+    nets: Option<Vec<Net>>,
+}
+
+impl<'a> Fit<'a> {
+    /// Fits patches that meet with common tangents off the features.
+    pub(crate) fn new(layout: &'a QuadLayout, given: Given<'_>) -> Result<Self, SplineFitError> {
+        Self::to(layout, given, None)
+    }
+
+    /// The same for a division of the layout of another fit, from which is taken what the division leaves as it was: curves and
+    /// patches are as fine as they were there, and are fitted anew where something has changed.
+    pub(crate) fn divided(
+        layout: &'a QuadLayout,
+        before: &Fit<'_>,
+        given: Given<'_>,
+    ) -> Result<Self, SplineFitError> {
+        Self::to(layout, given, Some(before))
+    }
+
+    fn to(
+        layout: &'a QuadLayout,
+        given: Given<'_>,
+        before: Option<&Fit<'_>>,
+    ) -> Result<Self, SplineFitError> {
+        let Given { parameters, units, progress } = given;
+        check(layout)?;
+        let spans = parameters.spans as usize;
+        let same = before.map_or_else(
+            || vec![false; layout.quads.len()],
+            |before| same_quads(before.setting.layout, layout),
+        );
+        let kept = |quad: usize| before.filter(|_| same[quad]);
+        // Few threads can work on the setting; the others take samples meanwhile.
+        let (setting, samples) = rayon::join(
+            || Setting::new(layout),
+            || samples(layout, |quad| kept(quad).map(|before| Arc::clone(&before.samples[quad]))),
+        );
+        // The error of the samples first, as if they had been taken first.
+        let (mut samples, mut setting) = (samples?, setting?);
+        // Building the index is work for one thread.
+        let is_needed = parameters.refinements > 0 && before.is_none();
+        let (index, ()) = rayon::join(
+            || is_needed.then(|| Arc::new(SurfaceIndex::build(&layout.part.mesh))),
+            || setting.make_corners(&samples, spans, progress),
+        );
+        let setting = setting;
+        let quads = 0..layout.quads.len();
+        let starts = quads.clone().into_par_iter().map(|quad| {
+            kept(quad)
+                .map_or_else(|| places(&samples[quad]).into(), |before| Arc::clone(&before.starts[quad]))
+        });
+        let starts: Vec<Arc<[[f64; 2]]>> = starts.collect();
+        let key = |quad: usize| {
+            kept(quad)
+                .and_then(|before| before.keys.get(quad).copied())
+                .unwrap_or_else(|| key_of(&samples[quad]))
+        };
+        let keys = if units.are_kept() { quads.into_par_iter().map(key).collect() } else { Vec::new() };
+        let (mut refinement, mut known, mut carried): (_, _, Option<Before>) = match before {
+            None => (Refinement::new(&setting, parameters, index), KnownFits::default(), None),
+            Some(before) => {
+                let common = Common::of(&before.setting, &setting, &same);
+                let refinement = Refinement::after(&before.refinement, &setting, &common, parameters);
+                let known = before.known.carried(&setting, &common);
+                (refinement, known, Some(before.round.carried(&common.quads)))
+            }
+        };
+        let near_enough = parameters.near_enough(&layout.part.mesh);
+        let patches =
+            Patches { setting: &setting, parameters, near_enough, units, progress, starts, samples: keys };
+        let mut round = loop {
+            progress.check()?;
+            let network =
+                network(&setting, &samples, refinement.spans(), &refinement.reach(&setting), &mut known)?;
+            let round = patches.fit(&mut samples, network, refinement.spans(), carried)?;
+            if !refinement.next(&setting, &round.network, &round.fitted, progress)
+                && !refinement.ease(&setting, &round.fitted, &samples, progress)
+            {
+                break round;
+            }
+            carried = Some(round.into());
+        };
+        patches.draw_nearer(&mut round.fitted, &mut samples)?;
+        let Patches { starts, samples: keys, .. } = patches;
+        let (beyond, nets) = (Vec::new(), None);
+        let mut fit = Self { setting, samples, starts, keys, refinement, known, round, beyond, nets };
+        if parameters.divisions > 0 {
+            fit.refinement.index(&fit.setting);
         }
-        before = Some(round);
+        // Knots come in rounds that not all threads are busy in. After a division they can wait: the next one may be better.
+        (fit.beyond, fit.nets) = rayon::join(
+            || fit.measured(parameters, before),
+            || before.is_none().then(|| fit.with_knots(parameters, progress)),
+        );
+        Ok(fit)
+    }
+
+    /// Where the surface is beyond the tolerance, or was before and is the same.
+    fn measured(&self, parameters: &Parameters, before: Option<&Fit<'_>>) -> Vec<Beyond> {
+        let Self { setting, samples, refinement, round: Round { network, fitted, .. }, .. } = self;
+        if parameters.divisions == 0 {
+            return Vec::new();
+        }
+        let Some(index) = refinement.known_index() else { return Vec::new() };
+        let measured = Measured { setting, network, fitted, samples, index };
+        let limit = parameters.largest_distance(&setting.layout.part.mesh);
+        match before {
+            None => measured.beyond(limit),
+            Some(before) => {
+                let same: Vec<bool> =
+                    (0..fitted.len()).map(|quad| self.has_same_patch(before, quad)).collect();
+                measured.beyond_after(&before.beyond, &same, limit)
+            }
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn measured_anew(&self, parameters: &Parameters) -> Vec<Beyond> {
+        self.measured(parameters, None)
+    }
+
+    #[cfg(test)]
+    pub(crate) fn network(&self) -> &Network {
+        &self.round.network
+    }
+
+    #[cfg(test)]
+    pub(crate) fn fitted(&self) -> &[Arc<crate::patches::Fitted>] {
+        &self.round.fitted
+    }
+
+    /// Whether a patch was taken over from another fit as it was.
+    pub(crate) fn has_same_patch(&self, before: &Fit<'_>, quad: usize) -> bool {
+        let patches = self.round.fitted.get(quad).zip(before.round.fitted.get(quad));
+        patches.is_some_and(|(own, other)| Arc::ptr_eq(own, other))
+    }
+
+    /// A box around each patch, that of its control points.
+    pub(crate) fn patch_boxes(&self) -> Vec<[DVec3; 2]> {
+        let nets = self.round.fitted.iter().map(|fitted| &fitted.net.control);
+        nets.map(|control| extent(control.iter().copied())).collect()
+    }
+
+    fn with_knots(&self, parameters: &Parameters, progress: &Progress) -> Vec<Net> {
+        let Round { network, fitted, .. } = &self.round;
+        insert_knots(&self.setting, &network.curves, fitted, parameters.max_normal_jump, progress)
+    }
+
+    /// The part of the surface that may be in certain boxes, without these knots: it is in the same places as with them, with larger
+    /// angles between patches.
+    pub(crate) fn rough_surface_in(&self, boxes: &[[DVec3; 2]]) -> SplineSurface {
+        let is_in =
+            |[low, high]: [DVec3; 2]| boxes.iter().any(|[l, h]| low.cmple(*h).all() && high.cmpge(*l).all());
+        let nets = self.round.fitted.iter().map(|fitted| fitted.net.clone()).collect();
+        let mut surface = assemble(&self.setting, &self.round.network, nets);
+        let edges = &surface.edges;
+        surface.patches.retain(|patch| is_in(extent(patch.control.iter().copied())));
+        surface.faces.retain(|face| {
+            let sides = face.loops.iter().flatten();
+            is_in(extent(sides.flat_map(|side| edges[side.edge as usize].control.iter().copied())))
+        });
+        surface
+    }
+
+    /// The surface, with knots.
+    pub(crate) fn surface(mut self, given: Given<'_>) -> SplineSurface {
+        let nets = self.nets.take();
+        let nets = nets.unwrap_or_else(|| self.with_knots(given.parameters, given.progress));
+        let mut surface = assemble(&self.setting, &self.round.network, nets);
+        simplify(&mut surface, self.setting.borders.tolerance);
+        surface
     }
 }
 
 /// The keys of the patches of the first round, before any knots are inserted.
 pub(crate) fn first_patches(
-    mut setting: Setting<'_>,
-    samples: &[PatchSamples],
+    layout: &QuadLayout,
     parameters: &Parameters,
 ) -> Result<Vec<UnitKey>, SplineFitError> {
+    check(layout)?;
+    let (setting, samples) = rayon::join(|| Setting::new(layout), || samples(layout, |_| None));
+    let (samples, mut setting) = (samples?, setting?);
     let progress = Progress::silent();
-    setting.make_corners(samples, parameters.spans as usize, &progress);
+    setting.make_corners(&samples, parameters.spans as usize, &progress);
     let refinement = Refinement::new(&setting, parameters, None);
     let network = network(
         &setting,
-        samples,
+        &samples,
         refinement.spans(),
         &refinement.reach(&setting),
         &mut KnownFits::default(),
     )?;
-    let keys = samples.par_iter().map(key_of).collect();
+    let keys = samples.par_iter().map(|samples| key_of(samples)).collect();
     let (units, starts) = (&Units::none(), Vec::new());
     let near_enough = parameters.near_enough(&setting.layout.part.mesh);
     let progress = &progress;
@@ -114,7 +254,7 @@ pub(crate) fn first_patches(
     Ok(patches.first_keys(&network, refinement.spans()))
 }
 
-fn assemble(setting: &Setting<'_>, network: Network, nets: Vec<Net>) -> SplineSurface {
+fn assemble(setting: &Setting<'_>, network: &Network, nets: Vec<Net>) -> SplineSurface {
     let layout = setting.layout;
     let edge = |e: usize| match &setting.borders.curves[e] {
         Some(curve) => curve.clone(),
@@ -128,7 +268,7 @@ fn assemble(setting: &Setting<'_>, network: Network, nets: Vec<Net>) -> SplineSu
     };
     let edges = (0..layout.edges.len()).map(edge).collect();
     SplineSurface {
-        vertices: network.frames.positions,
+        vertices: network.frames.positions.clone(),
         edges,
         patches: nets.into_iter().enumerate().map(|(quad, net)| patch(layout, quad, net)).collect(),
         faces: setting.borders.faces.clone(),

@@ -80,6 +80,33 @@ fn patches_are_divided_until_the_tolerance_holds() {
     assert!(fitted(&layout, &in_mm).0 == surface);
 }
 
+/// Around the corner nearest to a place a division may bring nothing: then others are tried, and the first is not kept.
+#[test]
+fn other_corners_are_tried_and_threads_do_not_matter() {
+    let layout = fixture("monster-lite");
+    let remarks = Arc::new(Remarks::default());
+    let progress = Progress::new(remarks.clone());
+    let tolerance = 9e-4;
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let parameters = Parameters { tolerance, ..Default::default() };
+        pool.install(|| fit(&layout, &parameters, &Units::none(), &progress).unwrap())
+    };
+    let surface = on(1);
+    let remarks = std::mem::take(&mut *remarks.0.lock().unwrap());
+    // "divided around 4 vertices; around 3 of them the surface is nearer"
+    let counts = |text: &String| -> Option<[usize; 2]> {
+        let words: Vec<&str> = text.strip_prefix("divided around ")?.split(' ').collect();
+        Some([words[0].parse().ok()?, words[3].parse().ok()?])
+    };
+    let trials: Vec<[usize; 2]> = remarks.iter().filter_map(counts).collect();
+    assert!(trials.iter().any(|[all, good]| good < all), "{remarks:?}");
+    assert!(!remarks.iter().any(|text| text.contains("nothing more")), "{remarks:?}");
+    assert!(deviation(&layout, &surface) < 1.05 * tolerance);
+    assert!(largest_jump(&surface) <= 0.1);
+    assert!(on(3) == surface);
+}
+
 #[test]
 fn a_tolerance_that_holds_divides_nothing() {
     let layout = fixture("y-form");
