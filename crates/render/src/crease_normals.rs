@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 use topipe_mesh::{DVec3, TriangleMesh};
 
-/// For each corner of each face, the mean of the normals of the faces at its vertex that turn from this face by less
+/// For each corner of some faces, the mean of the normals of the faces at its vertex that turn from this face by less
 /// than `crease` degrees, weighted by area. Needs no connectivity: works on any triangle soup with shared vertices.
-pub(crate) fn crease_normals(mesh: &TriangleMesh, crease: f64) -> Vec<[DVec3; 3]> {
+pub(crate) fn crease_normals(mesh: &TriangleMesh, crease: f64, of: &[u32]) -> Vec<[DVec3; 3]> {
     let count = mesh.vertex_count();
     let valid = |t: &[topipe_mesh::VertexId; 3]| t.iter().all(|v| v.index() < count);
     let area: Vec<DVec3> = mesh
@@ -32,9 +32,9 @@ pub(crate) fn crease_normals(mesh: &TriangleMesh, crease: f64) -> Vec<[DVec3; 3]
         }
     }
     let limit = crease.to_radians().cos();
-    (0..mesh.face_count())
-        .into_par_iter()
-        .map(|f| {
+    of.par_iter()
+        .map(|&f| {
+            let f = f as usize;
             let own = unit[f];
             if !valid(&mesh.triangles[f]) {
                 return [own; 3];
@@ -65,9 +65,9 @@ mod tests {
                 vec![[0, 1, 2], [0, 3, 1]],
             )
         };
-        let sharp = crease_normals(&fold(90.0), 40.0);
+        let sharp = crease_normals(&fold(90.0), 40.0, &[0]);
         assert!((sharp[0][0] - DVec3::Z).length() < 1e-12);
-        let gentle = crease_normals(&fold(20.0), 40.0);
+        let gentle = crease_normals(&fold(20.0), 40.0, &[0]);
         let expected = DVec3::new(10f64.to_radians().sin(), 0.0, 10f64.to_radians().cos());
         assert!((gentle[0][0] - expected).length() < 1e-12);
         assert!((gentle[0][2] - DVec3::Z).length() < 1e-12, "the far corner sees one face only");

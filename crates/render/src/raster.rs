@@ -1,7 +1,7 @@
 //! Primitives to samples: for each sample the depth and the primitive that is nearest to the viewer.
 
 use crate::camera::Projection;
-use crate::scene::{Primitive, ProjectedLayer};
+use crate::scene::{Look, Primitive, ProjectedLayer};
 use rayon::prelude::*;
 use topipe_mesh::DVec3;
 
@@ -10,25 +10,49 @@ const BAND: usize = 48;
 
 /// Depth and primitive of each sample.
 pub(crate) struct Buffer<'a> {
-    layers: Vec<&'a ProjectedLayer>,
+    layers: Vec<&'a ProjectedLayer<'a>>,
     /// Index of the first primitive of each layer, and the total.
     first: Vec<u32>,
     pub(crate) width: usize,
     /// Towards the viewer, in samples; negative infinity where nothing is.
     pub(crate) depth: Vec<f32>,
     primitive: Vec<u32>,
+    /// Of each primitive its place among the looks of its layer.
+    place: Vec<u32>,
+    /// The looks of what is seen, by layer.
+    looks: Vec<Vec<Look>>,
 }
 
 impl<'a> Buffer<'a> {
-    /// The primitive seen at a sample and its layer.
-    pub(crate) fn at(&self, sample: usize) -> Option<(&'a ProjectedLayer, &'a Primitive)> {
+    /// The primitive seen at a sample, its layer, and its look, if it is a triangle.
+    pub(crate) fn at(&self, sample: usize) -> Option<(&'a ProjectedLayer<'a>, Primitive, Option<&Look>)> {
         let primitive = self.primitive[sample];
         if primitive == u32::MAX {
             return None;
         }
-        let layer = self.first.partition_point(|&first| first <= primitive) - 1;
+        let layer = self.layer_of(primitive);
         let within = (primitive - self.first[layer]) as usize;
-        Some((self.layers[layer], &self.layers[layer].primitives[within]))
+        let look = self.looks[layer].get(self.place[primitive as usize] as usize);
+        Some((self.layers[layer], self.layers[layer].primitive(within)?, look))
+    }
+
+    fn layer_of(&self, primitive: u32) -> usize {
+        self.first.partition_point(|&first| first <= primitive) - 1
+    }
+
+    /// Finds the looks of all that is seen.
+    fn look(&mut self, projection: &Projection) {
+        let mut seen = vec![false; self.place.len()];
+        self.primitive.iter().filter(|p| **p != u32::MAX).for_each(|&p| seen[p as usize] = true);
+        for (k, layer) in self.layers.iter().enumerate() {
+            let own = self.first[k]..self.first[k + 1];
+            let seen: Vec<u32> = own.filter(|&p| seen[p as usize]).collect();
+            for (place, &primitive) in seen.iter().enumerate() {
+                self.place[primitive as usize] = place as u32;
+            }
+            let seen: Vec<u32> = seen.into_iter().map(|p| p - self.first[k]).collect();
+            self.looks.push(layer.looks(&seen, projection));
+        }
     }
 }
 
@@ -63,7 +87,7 @@ impl Primitive {
     /// Bounds in the picture: low x, high x, low y, high y.
     fn bounds(&self) -> [f64; 4] {
         let (low, high) = match self {
-            Self::Triangle { points: [a, b, c], .. } => (a.min(*b).min(*c), a.max(*b).max(*c)),
+            Self::Triangle { points: [a, b, c] } => (a.min(*b).min(*c), a.max(*b).max(*c)),
             Self::Capsule { ends: [a, b], radius, .. } => (a.min(*b) - *radius, a.max(*b) + *radius),
         };
         [low.x, high.x, low.y, high.y]
@@ -71,7 +95,7 @@ impl Primitive {
 
     fn depth(&self, x: f64, y: f64) -> Option<f64> {
         match self {
-            Self::Triangle { points, .. } => {
+            Self::Triangle { points } => {
                 let w = barycentric(points, x, y)?;
                 let inside = w.iter().all(|&w| w >= 0.0);
                 inside.then(|| w[0] * points[0].z + w[1] * points[1].z + w[2] * points[2].z)
@@ -96,18 +120,21 @@ fn samples(low: f64, high: f64, first: usize, end: usize) -> std::ops::Range<usi
 }
 
 /// Draws all layers into one buffer.
-pub(crate) fn rasterize<'a>(layers: &[&'a ProjectedLayer], projection: &Projection) -> Buffer<'a> {
+pub(crate) fn rasterize<'a>(layers: &[&'a ProjectedLayer<'a>], projection: &Projection) -> Buffer<'a> {
     let [width, height] = projection.size;
     let mut first = vec![0u32];
-    let mut bands: Vec<Vec<(u32, &Primitive)>> = vec![Vec::new(); height.div_ceil(BAND)];
+    // By band the primitives in it, each with its layer.
+    let mut bands: Vec<Vec<(u32, u32)>> = vec![Vec::new(); height.div_ceil(BAND)];
     let mut count = 0u32;
-    for layer in layers {
-        for primitive in &layer.primitives {
-            let [low_x, high_x, low_y, high_y] = primitive.bounds();
-            let rows = samples(low_y, high_y, 0, height);
-            if !rows.is_empty() && !samples(low_x, high_x, 0, width).is_empty() {
-                for band in &mut bands[rows.start / BAND..=(rows.end - 1) / BAND] {
-                    band.push((count, primitive));
+    for (number, layer) in layers.iter().enumerate() {
+        for index in 0..layer.len() {
+            if let Some(primitive) = layer.primitive(index) {
+                let [low_x, high_x, low_y, high_y] = primitive.bounds();
+                let rows = samples(low_y, high_y, 0, height);
+                if !rows.is_empty() && !samples(low_x, high_x, 0, width).is_empty() {
+                    for band in &mut bands[rows.start / BAND..=(rows.end - 1) / BAND] {
+                        band.push((count, number as u32));
+                    }
                 }
             }
             count += 1;
@@ -119,7 +146,9 @@ pub(crate) fn rasterize<'a>(layers: &[&'a ProjectedLayer], projection: &Projecti
     let rows = depth.par_chunks_mut(width * BAND).zip(nearest.par_chunks_mut(width * BAND)).zip(&bands);
     rows.enumerate().for_each(|(band, ((depth, nearest), primitives))| {
         let top = band * BAND;
-        for &(index, primitive) in primitives {
+        for &(number, layer) in primitives {
+            let within = number - first[layer as usize];
+            let Some(primitive) = layers[layer as usize].primitive(within as usize) else { continue };
             let [low_x, high_x, low_y, high_y] = primitive.bounds();
             let columns = samples(low_x, high_x, 0, width);
             for y in samples(low_y, high_y, top, top + depth.len() / width) {
@@ -128,12 +157,16 @@ pub(crate) fn rasterize<'a>(layers: &[&'a ProjectedLayer], projection: &Projecti
                         let at = (y - top) * width + x;
                         if z as f32 > depth[at] {
                             depth[at] = z as f32;
-                            nearest[at] = index;
+                            nearest[at] = number;
                         }
                     }
                 }
             }
         }
     });
-    Buffer { layers: layers.to_vec(), first, width, depth, primitive: nearest }
+    let place = vec![u32::MAX; count as usize];
+    let layers = layers.to_vec();
+    let mut buffer = Buffer { layers, first, width, depth, primitive: nearest, place, looks: Vec::new() };
+    buffer.look(projection);
+    buffer
 }

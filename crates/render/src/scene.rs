@@ -3,7 +3,7 @@
 use crate::camera::Projection;
 use crate::crease_normals::crease_normals;
 use crate::{Color, RenderError};
-use topipe_mesh::{DVec3, TriangleMesh};
+use topipe_mesh::{DVec3, FaceId, TriangleMesh};
 
 /// How the elements of a layer are coloured.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,7 +142,7 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
-    pub(crate) fn project(&self, projection: &Projection) -> Vec<ProjectedLayer> {
+    pub(crate) fn project(&self, projection: &Projection) -> Vec<ProjectedLayer<'_>> {
         self.layers
             .iter()
             .map(|layer| match layer {
@@ -153,13 +153,11 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// What the rasterizer draws. Points are in samples, normals in view coordinates, colours in linear light.
+/// What the rasterizer draws. Points are in samples.
 #[derive(Debug, Clone)]
 pub(crate) enum Primitive {
     Triangle {
         points: [DVec3; 3],
-        normals: [DVec3; 3],
-        colors: [[f32; 3]; 3],
     },
     /// A segment with round ends.
     Capsule {
@@ -172,13 +170,78 @@ pub(crate) enum Primitive {
     },
 }
 
+/// What the light falls on: normals in view coordinates and colours in linear light, at the corners of a triangle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Look {
+    pub(crate) normals: [DVec3; 3],
+    pub(crate) colors: [[f32; 3]; 3],
+}
+
+/// A layer in the picture. Triangles are put together when they are asked for: kept, those of a fine surface would take more memory than
+/// all else, and most of them are not seen.
 #[derive(Debug)]
-pub(crate) struct ProjectedLayer {
-    pub(crate) primitives: Vec<Primitive>,
+pub(crate) struct ProjectedLayer<'a> {
+    shape: Shape<'a>,
     pub(crate) opacity: f32,
     /// Colour and half width in samples of the edges of triangles.
     pub(crate) edges: Option<([f32; 3], f64)>,
     pub(crate) warn_back_faces: bool,
+}
+
+#[derive(Debug)]
+enum Shape<'a> {
+    Mesh {
+        layer: &'a MeshLayer<'a>,
+        /// The vertices in samples.
+        points: Vec<DVec3>,
+    },
+    Capsules(Vec<Primitive>),
+}
+
+impl ProjectedLayer<'_> {
+    /// Number of primitives.
+    pub(crate) fn len(&self) -> usize {
+        match &self.shape {
+            Shape::Mesh { layer, .. } => layer.mesh.face_count(),
+            Shape::Capsules(capsules) => capsules.len(),
+        }
+    }
+
+    /// A primitive; none where a corner has no place.
+    #[inline]
+    pub(crate) fn primitive(&self, index: usize) -> Option<Primitive> {
+        match &self.shape {
+            Shape::Mesh { layer, points } => {
+                let triangle = layer.mesh.triangles[index];
+                if triangle.iter().any(|v| v.index() >= points.len()) {
+                    return None;
+                }
+                let points = triangle.map(|v| points[v.index()]);
+                points.iter().all(|p| p.is_finite()).then_some(Primitive::Triangle { points })
+            }
+            Shape::Capsules(capsules) => capsules.get(index).cloned(),
+        }
+    }
+
+    /// The looks of some triangles, ascending; of other primitives none.
+    pub(crate) fn looks(&self, seen: &[u32], projection: &Projection) -> Vec<Look> {
+        let Shape::Mesh { layer, .. } = &self.shape else { return Vec::new() };
+        let mesh = layer.mesh;
+        let normals = match layer.shading {
+            Shading::Flat => seen.iter().map(|&f| [mesh.normal(FaceId(f)); 3]).collect(),
+            Shading::Smooth { crease } => crease_normals(mesh, crease, seen),
+        };
+        let look = |(&f, normals): (&u32, [DVec3; 3])| Look {
+            normals: normals.map(|n| projection.direction(n)),
+            colors: match &layer.coloring {
+                Coloring::PerVertex(colors) => {
+                    mesh.triangles[f as usize].map(|v| colors[v.index()].to_linear())
+                }
+                coloring => [coloring.element(f as usize); 3],
+            },
+        };
+        seen.iter().zip(normals).map(look).collect()
+    }
 }
 
 impl Coloring {
@@ -191,37 +254,11 @@ impl Coloring {
 }
 
 impl MeshLayer<'_> {
-    fn project(&self, projection: &Projection) -> ProjectedLayer {
-        let mesh = self.mesh;
-        let points: Vec<DVec3> = mesh.positions.iter().map(|&p| projection.point(p)).collect();
-        let smooth = match self.shading {
-            Shading::Flat => None,
-            Shading::Smooth { crease } => Some(crease_normals(mesh, crease)),
-        };
-        let vertex_colors: Option<Vec<[f32; 3]>> = match &self.coloring {
-            Coloring::PerVertex(colors) => Some(colors.iter().map(|c| c.to_linear()).collect()),
-            _ => None,
-        };
-        let mut primitives = Vec::with_capacity(mesh.face_count());
-        for f in mesh.faces() {
-            let triangle = mesh.triangles[f.index()];
-            if triangle.iter().any(|v| v.index() >= points.len() || !points[v.index()].is_finite()) {
-                continue;
-            }
-            let normals = smooth.as_ref().map_or_else(|| [mesh.normal(f); 3], |normals| normals[f.index()]);
-            let colors = match &vertex_colors {
-                Some(colors) => triangle.map(|v| colors[v.index()]),
-                None => [self.coloring.element(f.index()); 3],
-            };
-            primitives.push(Primitive::Triangle {
-                points: triangle.map(|v| points[v.index()]),
-                normals: normals.map(|n| projection.direction(n)),
-                colors,
-            });
-        }
+    fn project(&self, projection: &Projection) -> ProjectedLayer<'_> {
+        let points = self.mesh.positions.iter().map(|&p| projection.point(p)).collect();
         let half_width = |width: f64| width * projection.supersampling as f64 / 2.0;
         ProjectedLayer {
-            primitives,
+            shape: Shape::Mesh { layer: self, points },
             opacity: self.opacity.clamp(0.0, 1.0),
             edges: self.edges.map(|e| (e.color.to_linear(), half_width(e.width))),
             warn_back_faces: self.warn_back_faces,
@@ -230,7 +267,7 @@ impl MeshLayer<'_> {
 }
 
 impl LineLayer {
-    fn project(&self, projection: &Projection) -> ProjectedLayer {
+    fn project(&self, projection: &Projection) -> ProjectedLayer<'_> {
         let (radius, tube) = match self.width {
             LineWidth::Pixels(width) => (width * projection.supersampling as f64 / 2.0, false),
             LineWidth::Tube(radius) => (radius * projection.scale, true),
@@ -251,6 +288,7 @@ impl LineLayer {
             }
             points.windows(2).for_each(|pair| push(pair[0], pair[1]));
         }
-        ProjectedLayer { primitives, opacity: 1.0, edges: None, warn_back_faces: false }
+        let shape = Shape::Capsules(primitives);
+        ProjectedLayer { shape, opacity: 1.0, edges: None, warn_back_faces: false }
     }
 }

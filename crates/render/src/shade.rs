@@ -2,7 +2,7 @@
 
 use crate::camera::Projection;
 use crate::raster::{Buffer, along_segment, barycentric};
-use crate::scene::{Primitive, ProjectedLayer};
+use crate::scene::{Look, Primitive, ProjectedLayer};
 use crate::{Color, Image, Options};
 use rayon::prelude::*;
 use topipe_mesh::DVec3;
@@ -37,9 +37,14 @@ fn lit(base: [f32; 3], normal: DVec3, light: f32) -> [f32; 3] {
     base.map(|c| c * brightness + gloss)
 }
 
-fn shade_sample(layer: &ProjectedLayer, primitive: &Primitive, x: f64, y: f64, light: f32) -> Shaded {
-    match primitive {
-        Primitive::Triangle { points, normals, colors } => {
+fn shade_sample(
+    (layer, primitive, look): (&ProjectedLayer<'_>, Primitive, Option<&Look>),
+    [x, y]: [f64; 2],
+    light: f32,
+) -> Shaded {
+    match &primitive {
+        Primitive::Triangle { points } => {
+            let Some(Look { normals, colors }) = look else { return Shaded { color: [0.0; 3], alpha: 0.0 } };
             // The rasterizer found the sample inside the triangle, so it has an area.
             let w = barycentric(points, x, y).unwrap_or([1.0, 0.0, 0.0]);
             let [a, b, c] = points;
@@ -109,16 +114,16 @@ pub(crate) fn shade(
         for k in 0..s * s {
             let (x, y) = (left + k % s, top + k / s);
             let sample = y * solid.width + x;
-            let center = (x as f64 + 0.5, y as f64 + 0.5);
+            let center = [x as f64 + 0.5, y as f64 + 0.5];
             let mut color = background;
-            if let Some((layer, primitive)) = solid.at(sample) {
-                color = shade_sample(layer, primitive, center.0, center.1, light).color;
+            if let Some(seen) = solid.at(sample) {
+                color = shade_sample(seen, center, light).color;
                 hit = true;
             }
             for buffer in translucent {
                 let in_front = buffer.depth[sample] > solid.depth[sample];
-                if let (true, Some((layer, primitive))) = (in_front, buffer.at(sample)) {
-                    let over = shade_sample(layer, primitive, center.0, center.1, 1.0);
+                if let (true, Some(seen)) = (in_front, buffer.at(sample)) {
+                    let over = shade_sample(seen, center, 1.0);
                     color = mix(color, over.color, over.alpha);
                     hit = true;
                 }

@@ -1,6 +1,6 @@
 //! What a report tells beside the model.
 
-use crate::{Histogram, Scene};
+use crate::{EncodedScene, Histogram};
 use serde_json::Value;
 
 /// A whole report. Nothing in it must be there: what is missing shows as missing.
@@ -29,7 +29,7 @@ pub struct Document {
     /// Distributions.
     pub histograms: Vec<Histogram>,
     /// The model.
-    pub scene: Scene,
+    pub scene: EncodedScene,
     /// The model in small pictures.
     pub pictures: Vec<Picture>,
     /// What could not be shown, and why.

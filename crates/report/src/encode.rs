@@ -13,6 +13,32 @@ use serde::Serialize;
 use std::io::Write;
 use topipe_mesh::DVec3;
 
+/// A scene as a page holds it. Making it takes longer than the rest of the page, and needs nothing else of a run.
+#[derive(Debug, Clone)]
+pub struct EncodedScene {
+    /// JSON, without anything that ends a script element.
+    pub(crate) header: String,
+    /// Deflated, in base 64.
+    pub(crate) geometry: String,
+    pub(crate) is_empty: bool,
+}
+
+impl From<&Scene> for EncodedScene {
+    fn from(scene: &Scene) -> Self {
+        let (header, geometry) = encode(scene);
+        // In a script element only `</` and `<!--` are special; JSON may write `<` as an escape.
+        let header = serde_json::to_string(&header).unwrap_or_default().replace('<', "\\u003c");
+        let is_empty = scene.surfaces.is_empty() && scene.lines.is_empty() && scene.points.is_empty();
+        Self { header, geometry, is_empty }
+    }
+}
+
+impl Default for EncodedScene {
+    fn default() -> Self {
+        Self::from(&Scene::default())
+    }
+}
+
 /// Where an array stands in the bytes.
 #[derive(Debug, Clone, Copy, Serialize)]
 struct Block {
@@ -22,7 +48,7 @@ struct Block {
 
 /// What the viewer is told about the bytes.
 #[derive(Debug, Serialize)]
-pub(crate) struct Header {
+struct Header {
     low: [f64; 3],
     high: [f64; 3],
     /// Length of the bytes when they are unpacked.
@@ -181,7 +207,7 @@ impl Arrays {
 }
 
 /// The scene as a header and its arrays, deflated and in base 64.
-pub(crate) fn encode(scene: &Scene) -> (Header, String) {
+fn encode(scene: &Scene) -> (Header, String) {
     let (low, high) = scene.bounds();
     let extent = (high - low).map(|side| if side > 0.0 { side } else { 1.0 });
     let mut arrays = Arrays { bytes: Vec::new(), low, extent };

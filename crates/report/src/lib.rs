@@ -19,6 +19,7 @@
 //!     vec![[0, 1, 2]],
 //! );
 //! let scene = Scene { surfaces: vec![Surface::new("mesh", "Mesh", triangle)], ..Scene::default() };
+//! let scene = (&scene).into();
 //! let page = html(&Document { title: "a <triangle>".into(), scene, ..Document::default() });
 //! assert!(page.starts_with("<!DOCTYPE html>") && page.contains("a &lt;triangle&gt;"));
 //! ```
@@ -31,6 +32,7 @@ mod page;
 mod scene;
 
 pub use document::{Document, Export, Figures, Outcome, Parameter, Picture, Stage};
+pub use encode::EncodedScene;
 pub use histogram::Histogram;
 pub use page::html;
 pub use scene::{Categories, ColorMaps, Field, Label, Lines, Points, Scene, Surface};

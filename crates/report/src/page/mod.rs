@@ -5,7 +5,6 @@ mod figures;
 mod run;
 
 use crate::document::{Document, Picture};
-use crate::encode::encode;
 use crate::figures::{Section, State};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -34,9 +33,6 @@ const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 
 
 /// Writes the report as one HTML file.
 pub fn html(document: &Document) -> String {
-    let (header, geometry) = encode(&document.scene);
-    // In a script element only `</` and `<!--` are special; JSON may write `<` as an escape.
-    let header = serde_json::to_string(&header).unwrap_or_default().replace('<', "\\u003c");
     let sections: Vec<(String, Vec<Section>)> =
         document.figures.iter().map(|f| (f.stage.clone(), crate::figures::sections(&f.value))).collect();
     let findings = || sections.iter().flat_map(|(_, sections)| sections).flat_map(|s| &s.findings);
@@ -71,8 +67,8 @@ pub fn html(document: &Document) -> String {
                          the model is rounded to 16 bits of its bounding box for display. This file needs no network."
                     }
                 }
-                script #scene type="application/json" { (PreEscaped(header)) }
-                script #geometry type="application/octet-stream" { (PreEscaped(geometry)) }
+                script #scene type="application/json" { (PreEscaped(&document.scene.header)) }
+                script #geometry type="application/octet-stream" { (PreEscaped(&document.scene.geometry)) }
                 script {
                     (PreEscaped("'use strict';\n"))
                     @for script in SCRIPTS { (PreEscaped(script)) }
@@ -125,12 +121,10 @@ fn banner(document: &Document, broken: usize) -> Markup {
 }
 
 fn model(document: &Document) -> Markup {
-    let scene = &document.scene;
-    let empty = scene.surfaces.is_empty() && scene.lines.is_empty() && scene.points.is_empty();
     html! {
         section #model aria-labelledby="model-title" {
             h2 #model-title { "Model" }
-            @if empty {
+            @if document.scene.is_empty {
                 p.note { "There is no result with a shape to show." }
             } @else {
                 div #viewer { noscript { p.note { "The model needs scripts; everything below does not." } } }

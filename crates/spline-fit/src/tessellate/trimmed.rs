@@ -288,21 +288,23 @@ fn divide(
     }
     for _ in 0..ROUNDS {
         let Some(inside) = inside(triangulation, borders) else { return };
-        let mut points: Vec<Place> = Vec::new();
+        // Each with an end of its edge, from which the way to it is short; the point before it may lie anywhere.
+        let mut points: Vec<(Place, FixedVertexHandle)> = Vec::new();
         for edge in triangulation.undirected_edges() {
             let [a, b] = edge.vertices().map(|v| v.data().at);
             let (x, y) = ((b[0] - a[0]).abs(), (b[1] - a[1]).abs());
             let within = edge.as_directed().face().as_inner().is_some_and(|f| inside[f.fix().index()]);
             if !edge.is_constraint_edge() && within && (x > across * 1.000_001 || x.hypot(y) > longest) {
-                points.push([(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0]);
+                let middle = [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0];
+                points.push((middle, edge.vertices()[0].fix()));
             }
         }
         if points.is_empty() {
             return;
         }
-        for at in points {
+        for (at, near) in points {
             // Earlier points of the round may have come to lie there.
-            let free = match triangulation.locate(Point2::new(at[0], at[1])) {
+            let free = match triangulation.locate_with_hint(Point2::new(at[0], at[1]), near) {
                 PositionInTriangulation::OnFace(_) => true,
                 PositionInTriangulation::OnEdge(edge) => {
                     !triangulation.directed_edge(edge).is_constraint_edge()
@@ -310,7 +312,7 @@ fn divide(
                 _ => false,
             };
             let vertex = VertexId::new(mesh.positions.len());
-            if free && triangulation.insert(Corner { at, vertex }).is_ok() {
+            if free && triangulation.insert_with_hint(Corner { at, vertex }, near).is_ok() {
                 mesh.positions.push(development.position(at));
             }
         }

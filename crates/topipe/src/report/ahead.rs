@@ -12,11 +12,11 @@ use topipe_engine::{
     Cache, ContentHash, Event, EventSink, ExitCode, InputRecord, Outcome, Pipeline, Registry, RunRecord,
     StageRecord, Value,
 };
-use topipe_report::{Histogram, Picture, Scene};
+use topipe_report::{EncodedScene, Histogram, Picture};
 
 /// What a report shows of results themselves.
 pub(super) struct Model {
-    pub(super) scene: Scene,
+    pub(super) scene: EncodedScene,
     pub(super) pictures: Vec<Picture>,
     pub(super) histograms: Vec<Histogram>,
     pub(super) left_out: Vec<String>,
@@ -25,7 +25,8 @@ pub(super) struct Model {
 impl Model {
     pub(super) fn of(results: &Results<'_>) -> Self {
         let (scene, histograms, left_out) = scene(results);
-        Self { pictures: pictures(&scene), scene, histograms, left_out }
+        let (pictures, scene) = rayon::join(|| pictures(&scene), || EncodedScene::from(&scene));
+        Self { pictures, scene, histograms, left_out }
     }
 }
 
