@@ -141,7 +141,10 @@ fn border_leg(setting: &Setting<'_>, spoke: Spoke) -> Option<Leg> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::common::same_quads;
     use crate::setting::tests::layout;
+    use topipe_progress::Progress;
+    use topipe_quad_matching::divide;
 
     /// What is known from another refinement is what would be found without it, whatever has changed meanwhile.
     #[test]
@@ -157,6 +160,35 @@ mod tests {
                 setting.reach(&spans).iter().enumerate().map(|(e, r)| r * some(step, closer)(e)).collect();
             let found = network(&setting, &samples, &spans, &reach, &mut known).unwrap();
             let fresh = network(&setting, &samples, &spans, &reach, &mut KnownFits::default()).unwrap();
+            assert_eq!(found.frames.positions, fresh.frames.positions);
+            for (found, fresh) in found.curves.iter().zip(&fresh.curves) {
+                assert_eq!((&found.control, &found.normals), (&fresh.control, &fresh.normals));
+            }
+        }
+    }
+
+    /// What is carried over to a division of the layout is what would be found there.
+    #[test]
+    fn carried_fits_change_nothing() {
+        let (layout, samples) = layout("y-form");
+        let setting = Setting::new(&layout).unwrap();
+        let spans = vec![4; layout.edges.len()];
+        let mut known = KnownFits::default();
+        network(&setting, &samples, &spans, &setting.reach(&spans), &mut known).unwrap();
+        for quad in [0, layout.quads.len() / 3, layout.quads.len() - 1] {
+            let wanted = [layout.corners(quad).to_vec()];
+            let Some(division) = divide(&layout, &wanted, &Progress::silent()).unwrap() else { continue };
+            let finer = division.layout;
+            let samples = crate::fit::samples(&finer, |_| None).unwrap();
+            let divided = Setting::new(&finer).unwrap();
+            let common = Common::of(&setting, &divided, &same_quads(&layout, &finer));
+            let mut carried = known.carried(&divided, &common);
+            let kept = carried.edges.iter().filter(|edge| edge.is_known()).count();
+            assert!((layout.edges.len() / 3..layout.edges.len() - 8).contains(&kept), "{kept}");
+            let spans = vec![4; finer.edges.len()];
+            let reach = divided.reach(&spans);
+            let found = network(&divided, &samples, &spans, &reach, &mut carried).unwrap();
+            let fresh = network(&divided, &samples, &spans, &reach, &mut KnownFits::default()).unwrap();
             assert_eq!(found.frames.positions, fresh.frames.positions);
             for (found, fresh) in found.curves.iter().zip(&fresh.curves) {
                 assert_eq!((&found.control, &found.normals), (&fresh.control, &fresh.normals));

@@ -70,6 +70,11 @@ pub(crate) struct KnownEdge {
 }
 
 impl KnownEdge {
+    #[cfg(test)]
+    pub(crate) fn is_known(&self) -> bool {
+        self.curve.is_some()
+    }
+
     /// [`SmoothCurve::normal_control`], found once.
     pub(crate) fn normal_control(&mut self, curve: &SmoothCurve) -> Vec<DVec3> {
         match &self.normals {

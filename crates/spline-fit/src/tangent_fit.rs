@@ -8,6 +8,7 @@
 //!
 //! Borders of region faces are given: their curves lie on the shapes, and where the mesh meets a shape smoothly the
 //! patch takes its normals along the border from the shape.
+
 use crate::beyond::{Beyond, Measured};
 use crate::common::{Common, same_quads};
 use crate::fit::{check, samples};
