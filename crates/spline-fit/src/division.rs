@@ -33,6 +33,7 @@ fn improved(
     given: Given<'_>,
 ) -> Result<SplineSurface, SplineFitError> {
     let progress = given.progress;
+    // Not looked for either, where nothing is to be divided.
     if fit.beyond.is_empty() {
         return Ok(fit.surface(given));
     }
@@ -63,14 +64,12 @@ fn improved(
             }
         }
     }
-    if given.parameters.divisions > 0 {
-        progress.remark(&format!("beyond the tolerance {}: dividing brings nothing more", text(&fit.beyond)));
-    }
+    progress.remark(&format!("beyond the tolerance {}: dividing brings nothing more", text(&fit.beyond)));
     Ok(fit.surface(given))
 }
 
 /// Whether a fit to a division around these vertices, one for each place, is to be taken; the trials learn from it. It is where nearly
-/// all of them have brought the surface nearer, and the others have done no harm: they are divided further.
+/// all of them have brought the surface nearer, and the others have done no harm: what is left there is divided around other vertices.
 fn is_better(
     finer: &Fit<'_>,
     fit: &Fit<'_>,
