@@ -89,8 +89,9 @@ pub(crate) fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
         });
     }
     let grain = grain(&layout.part.mesh);
+    let room = room(layout, &sides);
     for chain in chains::chains(layout, &sides, &borders.curves, grain) {
-        outline::fit(layout, &chain, &shapes[chain.region.index()], grain, diagonal, &mut borders);
+        outline::fit(layout, &chain, &shapes[chain.region.index()], grain, diagonal, &room, &mut borders);
     }
     let connectivity =
         Connectivity::build(&layout.part.mesh).map_err(|error| SplineFitError::Layout(error.to_string()))?;
@@ -100,6 +101,18 @@ pub(crate) fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
         }
     }
     Ok(borders)
+}
+
+/// How far each vertex of the layout is from the nearest one that an edge off the borders joins to it, mm.
+fn room(layout: &QuadLayout, sides: &[Beside]) -> Vec<f64> {
+    let mut room = vec![f64::INFINITY; layout.vertices.len()];
+    for (edge, _) in layout.edges.iter().zip(sides).filter(|(_, beside)| **beside == [None; 2]) {
+        let [a, b] = edge.ends.map(|v| layout.part.mesh.position(layout.vertices[v as usize]));
+        for v in edge.ends {
+            room[v as usize] = room[v as usize].min(a.distance(b));
+        }
+    }
+    room
 }
 
 /// The length of an edge of a face at a random place of the surface, mm. Cuts leave many short edges beside them, which
@@ -402,6 +415,28 @@ mod tests {
                 assert!(off < 1.2 * limit, "{off} of {limit}");
             }
         }
+    }
+
+    /// Where a quad beside it is narrow, a border stays near to the mesh; elsewhere it is what it would be.
+    #[test]
+    fn a_border_leaves_room_for_narrow_quads() {
+        let (turn, away) = positions()[1];
+        let mut layout = washer(turn, away, true);
+        // The tip of a tooth between edges 8 and 9, and a vertex close to it on the wall.
+        let on_wall = VertexId(3 * SECTORS + SECTORS / 4);
+        let tip = layout.part.mesh.position(layout.vertices[9]);
+        layout.part.mesh.positions[on_wall.index()] = tip - turn * DVec3::Z * 0.016;
+        let without = borders(&layout).unwrap();
+        layout.vertices.push(on_wall);
+        let path = vec![layout.vertices[9], on_wall];
+        layout.edges.push(MacroEdge { ends: [9, 12], path, feature: None });
+        let with = borders(&layout).unwrap();
+        let [near, far] = [&with, &without].map(|found| found.vertices[9].unwrap().distance(tip));
+        assert!(near < 1.2 * outline::ROOM * 0.016 && far > 0.012, "{near} {far}");
+        // The tip on the other side is cut off all the same.
+        let across = layout.part.mesh.position(layout.vertices[11]);
+        let other = with.vertices[11].unwrap().distance(across);
+        assert!(other > 0.5 * far, "{other} {far}");
     }
 
     #[test]

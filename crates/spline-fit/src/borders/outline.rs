@@ -25,6 +25,12 @@ const OWN_WAVE: f64 = 0.25;
 /// 1.8e-3, 1.3e-3 and 1e-3: beam-two-holes 0.26, 0.18, 0.18 and 761,396, 747,292, 736,056; bell-crank 0.16, 0.18, 0.18 and
 /// 658,784, 636,428, 602,020.
 pub(super) const FARTHEST: f64 = 1.0e-3;
+/// Nor farther than this share of the way to the nearest vertex of the layout that is not on the border: a narrow quad along it would
+/// be turned over, as its other vertices stay where they are. Pairs of triangles that pass through each other on bell-crank and
+/// cantilever-four, triangulated to 5e-4 of the diagonal: 54 and 20 without, 8 and 5 with a quarter, 5 and 5 with an eighth.
+pub(super) const ROOM: f64 = 0.25;
+/// But where there is no room at all a tooth of this share of [`FARTHEST`] may be cut off.
+const LEAST: f64 = 0.05;
 /// Rounds in which the weight of teeth that are farther grows.
 const PULLS: usize = 12;
 /// Spans of the reference curve are at most this many edges of the mesh long, and half as long as the edges of the border.
@@ -102,11 +108,17 @@ pub(super) fn fit(
     shape: &RegionShape,
     grain: f64,
     diagonal: f64,
+    room: &[f64],
     borders: &mut Borders,
 ) {
     let development = Development::new(shape);
     let outline = Outline::new(layout, chain, &development, borders);
-    let Some(curve) = outline.curve(chain, grain, diagonal) else { return };
+    let end = chain.sides.last().map(|s| layout.edges[s.edge as usize].ends[usize::from(!s.reversed)]);
+    let vertices = chain.sides.iter().map(|&side| layout.start(side)).chain(end);
+    let farthest = FARTHEST * diagonal;
+    let limits: Vec<f64> =
+        vertices.map(|v| (ROOM * room[v as usize]).clamp(LEAST * farthest, farthest)).collect();
+    let Some(curve) = outline.curve(chain, grain, &limits) else { return };
 
     // Vertices inside the chain move onto the curve.
     let count = chain.sides.len();
@@ -175,8 +187,15 @@ impl Outline {
         Self { points, along, starts }
     }
 
-    /// The smoothing spline with as few spans as keep it.
-    fn curve(&self, chain: &Chain, grain: f64, diagonal: f64) -> Option<Curve> {
+    /// What lies between values at the vertices of the layout, at a place along the chain.
+    fn between(&self, values: &[f64], s: f64) -> f64 {
+        let k = self.starts.partition_point(|&start| start <= s).clamp(1, self.starts.len() - 1);
+        let x = (s - self.starts[k - 1]) / (self.starts[k] - self.starts[k - 1]);
+        values[k - 1] + x.clamp(0.0, 1.0) * (values[k] - values[k - 1])
+    }
+
+    /// The smoothing spline with as few spans as keep it, hardly farther from the points than `limits`, mm, one per vertex.
+    fn curve(&self, chain: &Chain, grain: f64, limits: &[f64]) -> Option<Curve> {
         let length = self.along[self.along.len() - 1];
         if !(length > 0.0 && self.starts.windows(2).all(|w| w[0] < w[1])) {
             return None;
@@ -223,7 +242,7 @@ impl Outline {
             let curve = with(0, &samples)?;
             let mut far = false;
             for sample in &mut samples {
-                let d = curve.at(sample.s).0.distance(sample.point) / (FARTHEST * diagonal);
+                let d = curve.at(sample.s).0.distance(sample.point) / self.between(limits, sample.s);
                 if d > 1.0 {
                     sample.weight *= 1.0 + 2.0 * d * d;
                     far = true;
