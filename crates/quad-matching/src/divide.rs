@@ -176,8 +176,12 @@ fn divided(
     corners().for_each(|(quad, _)| new[quad] = true);
     let sides = quads.iter().map(|quad| quad.to_vec()).collect();
     let mut regions = Regions { tiled, vertices, edges, sides };
+    // What has moved nothing would move nothing again.
+    let mut idle = None;
     for effort in EFFORTS {
-        relax_beside(&mut regions, &new, effort, snap, progress)?;
+        if idle != Some(effort) && relax_beside(&mut regions, &new, effort, snap, progress)? == 0 {
+            idle = Some(effort);
+        }
     }
     turn_ends(&mut regions);
     let Regions { tiled, vertices, edges, .. } = regions;

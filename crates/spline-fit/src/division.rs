@@ -1,7 +1,7 @@
 //! More patches where knots are not enough.
 //!
-//! A fit is measured against the tolerance, see [`crate::beyond`]; around places beyond it the layout is divided, see
-//! [`topipe_quad_matching::divide`], and fitted again. A division of the patch that a place lies in can be around any of its corners,
+//! A fit is measured against the tolerance, see [`crate::beyond`]; around places beyond it, and on demand where patches pass through each
+//! other, see [`crate::crossed`], the layout is divided, see [`topipe_quad_matching::divide`], and fitted again. A division of the patch that a place lies in can be around any of its corners,
 //! and which of them helps is seen afterwards only: where one does not, another is tried. Fits to divisions take over what these leave
 //! as it was, so that a trial costs a small part of a fit.
 
@@ -10,7 +10,8 @@ use crate::score::Scores;
 use crate::tangent_fit::{Fit, Given};
 use crate::trials::Trials;
 use crate::{SplineFitError, SplineSurface};
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::hash_map::Entry;
 use topipe_mesh::DVec3;
 use topipe_quad_matching::{Division, QuadLayout, QuadMatchingError, divide};
 
@@ -33,14 +34,15 @@ fn improved(
     given: Given<'_>,
 ) -> Result<SplineSurface, SplineFitError> {
     let progress = given.progress;
+    let places = places(&fit, given.parameters.untangle);
     // Not looked for either, where nothing is to be divided.
-    if fit.beyond.is_empty() {
+    if places.is_empty() {
         return Ok(fit.surface(given));
     }
     if rounds > 0 {
-        progress.remark(&format!("beyond the tolerance {}: patches there are divided", text(&fit.beyond)));
+        progress.remark(&format!("{}: patches there are divided", text(&fit, given)));
         let coarse = fit.setting.layout;
-        let mut trials = Trials::new(fit.beyond.iter().map(|place| place.corners(coarse)), spent);
+        let mut trials = Trials::new(places.into_iter(), spent);
         while let Some(wanted) = trials.wanted() {
             let Some(division) = divide(coarse, &wanted, progress).map_err(failure)? else { break };
             let Division { layout, vertices } = division;
@@ -64,7 +66,7 @@ fn improved(
             }
         }
     }
-    progress.remark(&format!("beyond the tolerance {}: dividing brings nothing more", text(&fit.beyond)));
+    progress.remark(&format!("{}: dividing brings nothing more", text(&fit, given)));
     Ok(fit.surface(given))
 }
 
@@ -96,15 +98,55 @@ fn is_better(
     (nearly_all || of_good_ones) && scores.is_better()
 }
 
-fn text(beyond: &[Beyond]) -> String {
-    let count = match beyond.len() {
+/// The vertices that there are to choose from at each place beyond the tolerance, the nearest first, and where patches pass through
+/// each other, if that is to be untangled. Such places have no vertex in common with another one: of two divisions side by side it could
+/// not be told which has helped.
+fn places(fit: &Fit<'_>, untangle: bool) -> Vec<Vec<u32>> {
+    let mut places: Vec<Vec<u32>> =
+        fit.beyond.iter().map(|place| place.corners(fit.setting.layout)).collect();
+    let far = places.len();
+    let mut place_of: FxHashMap<u32, usize> = FxHashMap::default();
+    places.iter().enumerate().for_each(|(k, place)| place.iter().for_each(|&v| _ = place_of.insert(v, k)));
+    for crossed in fit.crossed.iter().filter(|_| untangle) {
+        let corners = crossed.corners(fit);
+        let place = corners.iter().find_map(|v| place_of.get(v).copied()).unwrap_or(places.len());
+        if place < far {
+            continue;
+        }
+        places.resize_with(places.len().max(place + 1), Vec::new);
+        for v in corners {
+            if let Entry::Vacant(free) = place_of.entry(v) {
+                free.insert(place);
+                places[place].push(v);
+            }
+        }
+    }
+    places
+}
+
+/// What is not as it should be.
+fn text(fit: &Fit<'_>, given: Given<'_>) -> String {
+    let places = |count: usize| match count {
         1 => "at one place".to_owned(),
         count => format!("at {count} places"),
     };
-    let farthest = beyond.first().map(|Beyond { distance, point: at, .. }| {
-        format!(", farthest {distance:.3e} mm at ({:.3}, {:.3}, {:.3})", at.x, at.y, at.z)
-    });
-    count + &farthest.unwrap_or_default()
+    let mut texts = Vec::new();
+    if let Some(Beyond { distance, point: at, .. }) = fit.beyond.first() {
+        let places = places(fit.beyond.len());
+        texts.push(format!(
+            "beyond the tolerance {places}, farthest {distance:.3e} mm at ({:.3}, {:.3}, {:.3})",
+            at.x, at.y, at.z
+        ));
+    }
+    let crossed = fit.crossed.first().filter(|_| given.parameters.untangle);
+    if let Some(at) = crossed.and_then(|crossed| crossed.points.first()) {
+        let places = places(fit.crossed.len());
+        texts.push(format!(
+            "patches pass through themselves or each other {places}, one at ({:.3}, {:.3}, {:.3})",
+            at.x, at.y, at.z
+        ));
+    }
+    texts.join("; ")
 }
 
 fn failure(error: QuadMatchingError) -> SplineFitError {

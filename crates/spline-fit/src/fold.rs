@@ -9,6 +9,10 @@ use topipe_mesh::DVec3;
 /// Samples within this distance, in parameters, show how the mesh is turned somewhere: a third of a span of eight.
 const NEAR: f64 = 0.04;
 
+/// A normal that makes this angle with those at the corners, 73 degrees, or a larger one, may be turned over between the points of the
+/// grid: the cosine.
+const NEARLY: f64 = 0.3;
+
 impl Net {
     /// The share of points, on a grid of about four points a span that includes the sides, where the patch is turned
     /// over: its normal points away from the normals at the corners, blended, and from that of the mesh there, which may
@@ -24,7 +28,39 @@ impl Net {
         samples: &PatchSamples,
         mut cell: impl FnMut([usize; 2]),
     ) -> f64 {
-        let (nu, nv) = (2 * self.basis_u.len(), 2 * self.basis_v.len());
+        let mut folded = 0;
+        self.any_normal(corners, |at, place, normal| {
+            let over = normal.dot(blended(corners, place)) <= 0.0
+                && !samples.near(place, NEAR).any(|sample| normal.dot(sample.normal) > 0.0);
+            if over {
+                folded += 1;
+                cell(at);
+            }
+            false
+        });
+        let [nu, nv] = self.grid();
+        folded as f64 / ((nu + 1) * (nv + 1)) as f64
+    }
+
+    /// Whether the normal points away from those at the corners, blended, at one of these points, or nearly does in a cell that is not
+    /// known to be turned over nowhere.
+    pub(crate) fn nearly_folds(&self, corners: &[DVec3; 4]) -> bool {
+        self.any_normal(corners, |_, place, normal| normal.dot(blended(corners, place)) <= NEARLY)
+    }
+
+    /// Steps of the grid.
+    fn grid(&self) -> [usize; 2] {
+        [2 * self.basis_u.len(), 2 * self.basis_v.len()]
+    }
+
+    /// Whether something holds at a point of the grid, given its cell of the net, its parameters and the normal there. Cells that
+    /// cannot fold are passed over.
+    fn any_normal(
+        &self,
+        corners: &[DVec3; 4],
+        mut holds: impl FnMut([usize; 2], [f64; 2], DVec3) -> bool,
+    ) -> bool {
+        let [nu, nv] = self.grid();
         let spans = [self.basis_u.len() / 2 - 1, self.basis_v.len() / 2 - 1];
         let columns: Vec<_> =
             (0..=nu).map(|i| hermite::local_pair(spans, [i as f64 / nu as f64, 0.0])).collect();
@@ -33,28 +69,24 @@ impl Net {
         let flat: Vec<bool> = (0..spans[0] * spans[1])
             .map(|cell| self.cannot_fold([cell % spans[0], cell / spans[0]], spans, corners))
             .collect();
-        let mut folded = 0;
         for j in 0..=nv {
             for i in 0..=nu {
                 let ((column, values_u, slopes_u), (row, values_v, slopes_v)) = (&columns[i], &rows[j]);
-                if flat[row[1] / 2 * spans[0] + column[0] / 2] {
+                let cell = [column[0] / 2, row[1] / 2];
+                if flat[cell[1] * spans[0] + cell[0]] {
                     continue;
                 }
-                let (u, v) = (i as f64 / nu as f64, j as f64 / nv as f64);
                 let both = |along: &[DVec2; 4], across: &[DVec2; 4]| {
                     std::array::from_fn(|k| DVec2::new(along[k].x, across[k].y))
                 };
                 let functions = ([column[0], row[1]], both(values_u, values_v), both(slopes_u, slopes_v));
-                let normal = self.combine(functions).normal();
-                let over = normal.dot(blended(corners, [u, v])) <= 0.0
-                    && !samples.near([u, v], NEAR).any(|sample| normal.dot(sample.normal) > 0.0);
-                if over {
-                    folded += 1;
-                    cell([column[0] / 2, row[1] / 2]);
+                let place = [i as f64 / nu as f64, j as f64 / nv as f64];
+                if holds(cell, place, self.combine(functions).normal()) {
+                    return true;
                 }
             }
         }
-        folded as f64 / ((nu + 1) * (nv + 1)) as f64
+        false
     }
 
     /// True only where the patch is nowhere in a cell of its net turned over against the normals at its corners, blended. Its
@@ -133,6 +165,7 @@ mod tests {
         let share = back.folded(&[DVec3::Z; 4], &samples(DVec3::Z));
         // The derivative 1 - 1.2 (1 - 2 u) is negative below u = 1/12.
         assert!((0.04..0.15).contains(&share), "{share}");
+        assert!(!flat.nearly_folds(&[DVec3::Z; 4]) && back.nearly_folds(&[DVec3::Z; 4]));
     }
 
     proptest! {

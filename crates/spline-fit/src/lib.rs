@@ -33,6 +33,7 @@ mod common;
 pub mod control_nets;
 mod corners;
 mod crease_curves;
+mod crossed;
 mod distances;
 mod division;
 mod easing;

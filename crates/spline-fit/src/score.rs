@@ -1,17 +1,15 @@
 //! What a division has brought, around each vertex that it divides.
 
 use crate::beyond::Beyond;
+use crate::crossed::Crossed;
 use crate::tangent_fit::Fit;
 use topipe_mesh::DVec3;
-use topipe_mesh::spatial::crossings;
 
 /// Pairs of triangles that may pass through each other for each place that is not beyond the tolerance any more. A place that is beyond
 /// it by a little does less harm than a solid that cannot be meshed: gmsh made no volume of beam-two-holes when one place, a few percent
 /// beyond, was done away with and 38 pairs crossed (4 did before). The bracket comes from 0.20 to 0.10 % of the diagonal for a sixth of
 /// a pair a place.
 const PAIRS: usize = 8;
-/// The chord tolerance of the triangles that are looked at for this, over the diagonal; the tolerance may be next to nothing.
-const CHORD: f64 = 5e-4;
 
 /// What of a fit lies nearest to a vertex.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -31,9 +29,10 @@ impl Score {
         self.pairs <= before.pairs + PAIRS * before.places.saturating_sub(self.places)
     }
 
-    /// Nearer than before, and clean.
+    /// Nearer than before, and clean; or as near, with fewer crossings.
     pub(crate) fn is_better_than(&self, before: &Self) -> bool {
-        self.excess < before.excess && self.is_clean_after(before)
+        let is_nearer = self.excess < before.excess && self.is_clean_after(before);
+        is_nearer || self.excess <= before.excess && self.pairs < before.pairs
     }
 
     fn and(self, other: &Self) -> Self {
@@ -54,14 +53,8 @@ pub(crate) struct Scores {
 impl Scores {
     /// Around these points; `tolerance` in mm.
     pub(crate) fn of(before: &Fit<'_>, after: &Fit<'_>, points: &[DVec3], tolerance: f64) -> Self {
-        let [mut old, mut new] = [before, after].map(|fit| scores(points, &fit.beyond, tolerance));
-        if old.iter().zip(&new).any(|(old, new)| new.excess < old.excess) {
-            // Pairs of patches that are the same pass through each other before and after alike.
-            let boxes = changed(before, after, points);
-            add_pairs(&mut old, points, &crossings_in(before, &boxes));
-            add_pairs(&mut new, points, &crossings_in(after, &boxes));
-        }
-        Self { before: old, after: new }
+        let of = |fit: &Fit<'_>| scores(points, &fit.beyond, &fit.crossed, tolerance);
+        Self { before: of(before), after: of(after) }
     }
 
     /// Whether the point with this number has a better score.
@@ -82,7 +75,7 @@ impl Scores {
 }
 
 /// What of these places is nearest to each point.
-fn scores(points: &[DVec3], beyond: &[Beyond], tolerance: f64) -> Vec<Score> {
+fn scores(points: &[DVec3], beyond: &[Beyond], crossed: &[Crossed], tolerance: f64) -> Vec<Score> {
     let mut scores = vec![Score::default(); points.len()];
     for place in beyond {
         if let Some(k) = nearest(points, place.point) {
@@ -90,43 +83,18 @@ fn scores(points: &[DVec3], beyond: &[Beyond], tolerance: f64) -> Vec<Score> {
             scores[k].excess += (place.distance - tolerance).powi(2);
         }
     }
-    scores
-}
-
-fn add_pairs(scores: &mut [Score], points: &[DVec3], crossings: &[DVec3]) {
-    for &crossing in crossings {
-        if let Some(k) = nearest(points, crossing) {
+    for &point in crossed.iter().flat_map(|crossed| &crossed.points) {
+        if let Some(k) = nearest(points, point) {
             scores[k].pairs += 1;
         }
     }
+    scores
 }
 
 /// The first of the points nearest to another.
 fn nearest(points: &[DVec3], to: DVec3) -> Option<usize> {
     let square = |k: &usize| points[*k].distance_squared(to);
     (0..points.len()).min_by(|a, b| square(a).total_cmp(&square(b)))
-}
-
-/// Boxes around the patches that are not the same in two fits, as they are in either; one for each of the points.
-fn changed(before: &Fit<'_>, after: &Fit<'_>, points: &[DVec3]) -> Vec<[DVec3; 2]> {
-    let mut boxes = vec![[DVec3::INFINITY, DVec3::NEG_INFINITY]; points.len()];
-    for all in [before.patch_boxes(), after.patch_boxes()] {
-        for (quad, [low, high]) in all.into_iter().enumerate() {
-            if !after.has_same_patch(before, quad)
-                && let Some(k) = nearest(points, (low + high) / 2.0)
-            {
-                boxes[k] = [boxes[k][0].min(low), boxes[k][1].max(high)];
-            }
-        }
-    }
-    boxes
-}
-
-/// Where triangles of the surface of a fit pass through each other, in certain boxes at least.
-fn crossings_in(fit: &Fit<'_>, boxes: &[[DVec3; 2]]) -> Vec<DVec3> {
-    let chord = CHORD * fit.setting.layout.part.mesh.diagonal();
-    let mesh = fit.rough_surface_in(boxes).tessellate(chord);
-    crossings(&mesh).into_iter().map(|crossing| crossing.point).collect()
 }
 
 #[cfg(test)]
@@ -140,10 +108,11 @@ mod tests {
     #[test]
     fn places_count_for_the_nearest_point() {
         let points = [DVec3::ZERO, DVec3::X * 10.0];
-        let found = scores(&points, &[place(3.0, 4.0), place(2.0, 6.0), place(1.5, 5.0)], 1.0);
-        assert_eq!(found[0], Score { places: 2, excess: 4.25, pairs: 0 });
-        assert_eq!(found[1], Score { places: 1, excess: 1.0, pairs: 0 });
-        assert_eq!(scores(&[], &[place(3.0, 4.0)], 1.0), []);
+        let crossed = Crossed { quads: vec![0], points: vec![DVec3::X, DVec3::X * 9.0, DVec3::X * 11.0] };
+        let found = scores(&points, &[place(3.0, 4.0), place(2.0, 6.0), place(1.5, 5.0)], &[crossed], 1.0);
+        assert_eq!(found[0], Score { places: 2, excess: 4.25, pairs: 1 });
+        assert_eq!(found[1], Score { places: 1, excess: 1.0, pairs: 2 });
+        assert_eq!(scores(&[], &[place(3.0, 4.0)], &[], 1.0), []);
     }
 
     #[test]

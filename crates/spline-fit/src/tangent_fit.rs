@@ -11,6 +11,7 @@
 
 use crate::beyond::{Beyond, Measured};
 use crate::common::{Common, same_quads};
+use crate::crossed::{self, Crossed};
 use crate::fit::{check, samples};
 use crate::hermite;
 use crate::knot_insertion::insert_knots;
@@ -53,6 +54,8 @@ pub(crate) struct Fit<'a> {
     round: Round,
     /// Where it is beyond the tolerance, the farthest first; not looked for where patches are not to be divided.
     pub(crate) beyond: Vec<Beyond>,
+    /// Where patches pass through themselves or each other; looked for where something is to be divided.
+    pub(crate) crossed: Vec<Crossed>,
     /// With knots, if they were inserted already.
     nets: Option<Vec<Net>>,
 }
@@ -138,16 +141,22 @@ impl<'a> Fit<'a> {
         };
         patches.draw_nearer(&mut round.fitted, &mut samples)?;
         let Patches { starts, samples: keys, .. } = patches;
-        let (beyond, nets) = (Vec::new(), None);
-        let mut fit = Self { setting, samples, starts, keys, refinement, known, round, beyond, nets };
+        let (beyond, crossed, nets) = (Vec::new(), Vec::new(), None);
+        let mut fit =
+            Self { setting, samples, starts, keys, refinement, known, round, beyond, crossed, nets };
         if parameters.divisions > 0 {
             fit.refinement.index(&fit.setting);
         }
-        // Knots come in rounds that not all threads are busy in. After a division they can wait: the next one may be better.
+        // Knots come in rounds that not all threads are busy in. Where divisions are likely they can wait: the next fit may be better.
+        let is_last = before.is_none() && !parameters.untangle;
         (fit.beyond, fit.nets) = rayon::join(
             || fit.measured(parameters, before),
-            || before.is_none().then(|| fit.with_knots(parameters, progress)),
+            || is_last.then(|| fit.with_knots(parameters, progress)),
         );
+        // Without places beyond the tolerance nothing is to be divided, and whoever does so wants to know whether it does harm.
+        if parameters.divisions > 0 && (parameters.untangle || before.is_some() || !fit.beyond.is_empty()) {
+            fit.crossed = crossed::crossed(&fit, before);
+        }
         Ok(fit)
     }
 
@@ -191,10 +200,15 @@ impl<'a> Fit<'a> {
         patches.is_some_and(|(own, other)| Arc::ptr_eq(own, other))
     }
 
-    /// A box around each patch, that of its control points.
-    pub(crate) fn patch_boxes(&self) -> Vec<[DVec3; 2]> {
-        let nets = self.round.fitted.iter().map(|fitted| &fitted.net.control);
-        nets.map(|control| extent(control.iter().copied())).collect()
+    /// Whether a patch is nearly turned over somewhere.
+    pub(crate) fn nearly_folds(&self, quad: usize) -> bool {
+        let fitted = &self.round.fitted[quad];
+        fitted.net.nearly_folds(&fitted.corners)
+    }
+
+    /// A box around a patch, that of its control points.
+    pub(crate) fn patch_box(&self, quad: usize) -> [DVec3; 2] {
+        extent(self.round.fitted[quad].net.control.iter().copied())
     }
 
     fn with_knots(&self, parameters: &Parameters, progress: &Progress) -> Vec<Net> {
@@ -203,26 +217,28 @@ impl<'a> Fit<'a> {
     }
 
     /// The part of the surface that may be in certain boxes, without these knots: it is in the same places as with them, with larger
-    /// angles between patches.
-    pub(crate) fn rough_surface_in(&self, boxes: &[[DVec3; 2]]) -> SplineSurface {
+    /// angles between patches. And the quads of its patches.
+    pub(crate) fn rough_surface_in(&self, boxes: &[[DVec3; 2]]) -> (SplineSurface, Vec<u32>) {
         let is_in =
             |[low, high]: [DVec3; 2]| boxes.iter().any(|[l, h]| low.cmple(*h).all() && high.cmpge(*l).all());
-        let nets = self.round.fitted.iter().map(|fitted| fitted.net.clone()).collect();
-        let mut surface = assemble(&self.setting, &self.round.network, nets);
+        let Round { network, fitted, .. } = &self.round;
+        let quads = (0..fitted.len() as u32).into_par_iter();
+        let quads: Vec<u32> = quads.filter(|&quad| is_in(self.patch_box(quad as usize))).collect();
+        let nets = quads.iter().map(|&quad| (quad as usize, fitted[quad as usize].net.clone()));
+        let mut surface = assemble(&self.setting, network, nets);
         let edges = &surface.edges;
-        surface.patches.retain(|patch| is_in(extent(patch.control.iter().copied())));
         surface.faces.retain(|face| {
             let sides = face.loops.iter().flatten();
             is_in(extent(sides.flat_map(|side| edges[side.edge as usize].control.iter().copied())))
         });
-        surface
+        (surface, quads)
     }
 
     /// The surface, with knots.
     pub(crate) fn surface(mut self, given: Given<'_>) -> SplineSurface {
         let nets = self.nets.take();
         let nets = nets.unwrap_or_else(|| self.with_knots(given.parameters, given.progress));
-        let mut surface = assemble(&self.setting, &self.round.network, nets);
+        let mut surface = assemble(&self.setting, &self.round.network, nets.into_iter().enumerate());
         simplify(&mut surface, self.setting.borders.tolerance);
         surface
     }
@@ -255,7 +271,12 @@ pub(crate) fn first_patches(
     Ok(patches.first_keys(&network, refinement.spans()))
 }
 
-fn assemble(setting: &Setting<'_>, network: &Network, nets: Vec<Net>) -> SplineSurface {
+/// The surface of certain quads.
+fn assemble(
+    setting: &Setting<'_>,
+    network: &Network,
+    nets: impl Iterator<Item = (usize, Net)>,
+) -> SplineSurface {
     let layout = setting.layout;
     let edge = |e: usize| match &setting.borders.curves[e] {
         Some(curve) => curve.clone(),
@@ -271,7 +292,7 @@ fn assemble(setting: &Setting<'_>, network: &Network, nets: Vec<Net>) -> SplineS
     SplineSurface {
         vertices: network.frames.positions.clone(),
         edges,
-        patches: nets.into_iter().enumerate().map(|(quad, net)| patch(layout, quad, net)).collect(),
+        patches: nets.map(|(quad, net)| patch(layout, quad, net)).collect(),
         faces: setting.borders.faces.clone(),
     }
 }

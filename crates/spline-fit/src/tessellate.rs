@@ -106,12 +106,21 @@ impl SplineSurface {
         patches: bool,
     ) -> (TriangleMesh, Vec<u32>, Vec<usize>) {
         let mut mesh = TriangleMesh { positions: self.vertices.clone(), triangles: Vec::new() };
+        // Of a part of a surface only the edges that it has.
+        let mut used = vec![false; self.edges.len()];
+        let of_faces = self.faces.iter().flat_map(|face| face.loops.iter().flatten());
+        let sides = self.patches.iter().flat_map(|patch| &patch.sides).chain(of_faces);
+        sides.for_each(|side| used[side.edge as usize] = true);
         // Points along each edge, ends included, as mesh vertices.
         let edges: Vec<Vec<VertexId>> = self
             .edges
             .iter()
             .zip(tolerances)
-            .map(|(edge, &tolerance)| {
+            .zip(used)
+            .map(|((edge, &tolerance), used)| {
+                if !used {
+                    return Vec::new();
+                }
                 let count = edge_divisions(edge, tolerance);
                 let mut points = vec![VertexId(edge.ends[0])];
                 for k in 1..count {

@@ -2,15 +2,17 @@
 //!
 //! Each place beyond the tolerance has the corners of its patch to choose from. A trial divides around one for each place at once, as
 //! they lie apart. Where all have brought nothing, the next trial takes other corners; where some have, it takes those alone, and the
-//! next round, which begins with what they have brought, takes other corners for the rest.
+//! next round, which begins with what they have brought, takes other corners for the rest. Where these bring nothing alone, because it
+//! was another one beside them that had, the rest goes on.
 
 use rustc_hash::FxHashSet;
 
 /// The trials of one round.
 pub(crate) struct Trials {
-    /// Of each place the vertices that may be tried, the nearest first; the first one alone where it was good.
+    /// Of each place the vertices that may be tried, the nearest first.
     open: Vec<Vec<u32>>,
-    good: Vec<bool>,
+    /// Of each place the one that was good in the last trial.
+    good: Vec<Option<u32>>,
     /// Only what was good is tried again, together; the number of places that are.
     alone: Option<usize>,
     /// Vertices that were tried and were not good.
@@ -25,21 +27,21 @@ impl Trials {
             vertices
         };
         let open: Vec<Vec<u32>> = places.map(unspent).collect();
-        let good = vec![false; open.len()];
+        let good = vec![None; open.len()];
         Self { open, good, alone: None, spent }
     }
 
-    /// What to divide next, for [`topipe_quad_matching::divide`]; none when all has been tried.
+    /// What to divide next, for [`topipe_quad_matching::divide`]; none when all has been tried, or would be tried again.
     pub(crate) fn wanted(&mut self) -> Option<Vec<Vec<u32>>> {
-        let good = self.good.iter().filter(|good| **good).count();
-        if self.alone.is_some_and(|alone| good == 0 || good == alone) {
+        let good = self.good.iter().flatten().count();
+        if good > 0 && self.alone == Some(good) {
             return None;
         }
         self.alone = (good > 0).then_some(good);
-        let places = self.open.iter().zip(&self.good);
-        let wanted =
-            places.map(|(open, good)| if *good || self.alone.is_none() { open.clone() } else { Vec::new() });
-        let wanted: Vec<Vec<u32>> = wanted.collect();
+        let wanted: Vec<Vec<u32>> = match self.alone {
+            Some(_) => self.good.iter().map(|good| good.iter().copied().collect()).collect(),
+            None => self.open.clone(),
+        };
         wanted.iter().any(|place| !place.is_empty()).then_some(wanted)
     }
 
@@ -51,16 +53,18 @@ impl Trials {
     /// Takes what came of the divisions around these vertices, one for each place.
     pub(crate) fn learn(&mut self, vertices: &[Option<u32>], is_good: impl Fn(u32) -> bool) {
         for (place, vertex) in vertices.iter().enumerate() {
+            if self.alone.is_some() && self.good[place].is_none() {
+                // It was not asked for.
+                continue;
+            }
             let Some(vertex) = *vertex else {
-                // None of them can be divided, or is wanted any more.
+                // None of them can be divided.
                 self.open[place].clear();
-                self.good[place] = false;
+                self.good[place] = None;
                 continue;
             };
-            self.good[place] = is_good(vertex);
-            if self.good[place] {
-                self.open[place] = vec![vertex];
-            } else {
+            self.good[place] = is_good(vertex).then_some(vertex);
+            if self.good[place].is_none() {
                 self.open[place].retain(|&other| other != vertex);
                 self.spent.insert(vertex);
             }
@@ -106,6 +110,21 @@ mod tests {
         trials.learn(&[None, Some(7), Some(7), Some(8)], |vertex| vertex == 7);
         assert_eq!(trials.wanted(), Some(vec![vec![], vec![7], vec![7], vec![]]));
         trials.learn(&[None, Some(7), Some(7), None], |_| true);
+        assert_eq!(trials.wanted(), None);
+    }
+
+    #[test]
+    fn the_rest_goes_on_where_what_was_good_is_nothing_alone() {
+        let mut trials = trials(&[&[3, 1], &[7, 5]], &[]);
+        assert!(trials.wanted().is_some());
+        trials.learn(&[Some(3), Some(7)], |vertex| vertex == 7);
+        assert_eq!(trials.wanted(), Some(vec![vec![], vec![7]]));
+        trials.learn(&[None, Some(7)], |_| false);
+        assert_eq!(trials.wanted(), Some(vec![vec![1], vec![5]]));
+        assert!(!trials.is_of_good_ones());
+        trials.learn(&[Some(1), Some(5)], |_| true);
+        assert_eq!(trials.wanted(), Some(vec![vec![1], vec![5]]));
+        trials.learn(&[Some(1), Some(5)], |_| true);
         assert_eq!(trials.wanted(), None);
     }
 

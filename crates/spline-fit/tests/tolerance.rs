@@ -107,6 +107,34 @@ fn other_corners_are_tried_and_threads_do_not_matter() {
     assert!(on(3) == surface);
 }
 
+/// Places where patches pass through themselves or each other, as triangles.
+fn crossed(layout: &QuadLayout, surface: &SplineSurface) -> usize {
+    topipe_mesh::spatial::crossings(&surface.tessellate(5e-4 * layout.part.mesh.diagonal())).len()
+}
+
+#[test]
+fn patches_are_untangled_on_demand() {
+    let layout = fixture("monster-lite");
+    let tangled = fitted(&layout, &Parameters::default()).0;
+    assert_eq!(tangled.patches.len(), layout.quads.len());
+    assert!(crossed(&layout, &tangled) > 0);
+    let remarks = Arc::new(Remarks::default());
+    let progress = Progress::new(remarks.clone());
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let parameters = Parameters { untangle: true, ..Default::default() };
+        pool.install(|| fit(&layout, &parameters, &Units::none(), &progress).unwrap())
+    };
+    let surface = on(1);
+    let remarks = std::mem::take(&mut *remarks.0.lock().unwrap());
+    assert!(remarks.iter().any(|text| text.contains("each other at one place, one at (")), "{remarks:?}");
+    assert_eq!(crossed(&layout, &surface), 0);
+    assert!((1..20).contains(&(surface.patches.len() - tangled.patches.len())));
+    assert!(deviation(&layout, &surface) < 1.05 * Parameters::default().tolerance);
+    assert!(largest_jump(&surface) <= 0.1);
+    assert!(on(3) == surface);
+}
+
 #[test]
 fn a_tolerance_that_holds_divides_nothing() {
     let layout = fixture("y-form");

@@ -1,0 +1,125 @@
+//! Where patches pass through themselves or each other.
+//!
+//! A patch that is turned over nowhere does not pass through itself, nor do two of them that meet along an edge, unless they are folded
+//! back on each other. So crossings are looked for around those patches only that are nearly turned over, see
+//! [`crate::patch_fit::Net::nearly_folds`]. Not found are crossings of parts of the surface that have nothing else to do with each
+//! other.
+
+use crate::tangent_fit::Fit;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use topipe_mesh::DVec3;
+use topipe_mesh::spatial::crossings;
+
+/// The chord tolerance of the triangles that are looked at, over the diagonal; the tolerance of the fit may be next to nothing.
+const CHORD: f64 = 5e-4;
+
+/// Patches that pass through themselves or each other.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Crossed {
+    /// One patch or two, the smaller number first; one alone passes through itself or through a face.
+    pub(crate) quads: Vec<u32>,
+    /// A point of each pair of triangles that pass through each other.
+    pub(crate) points: Vec<DVec3>,
+}
+
+impl Crossed {
+    /// The corners of the patches, the nearest first.
+    pub(crate) fn corners(&self, fit: &Fit<'_>) -> Vec<u32> {
+        let layout = fit.setting.layout;
+        let mut corners: Vec<u32> =
+            self.quads.iter().flat_map(|&quad| layout.corners(quad as usize)).collect();
+        corners.sort_unstable();
+        corners.dedup();
+        let off = |v: u32| {
+            let at = layout.part.mesh.position(layout.vertices[v as usize]);
+            self.points.iter().map(|point| point.distance_squared(at)).fold(f64::INFINITY, f64::min)
+        };
+        corners.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
+        corners
+    }
+}
+
+/// All of them in a fit, by their patches; what was there `before` and is the same is not looked for again.
+pub(crate) fn crossed(fit: &Fit<'_>, before: Option<&Fit<'_>>) -> Vec<Crossed> {
+    let layout = fit.setting.layout;
+    let count = layout.quads.len();
+    let same: Vec<bool> =
+        (0..count).map(|quad| before.is_some_and(|before| fit.has_same_patch(before, quad))).collect();
+    let mut beside_changed = vec![false; layout.vertices.len()];
+    for quad in (0..count).filter(|&quad| !same[quad]) {
+        layout.corners(quad).into_iter().for_each(|v| beside_changed[v as usize] = true);
+    }
+    let is_suspect = |quad: usize| {
+        layout.corners(quad).into_iter().any(|v| beside_changed[v as usize]) && fit.nearly_folds(quad)
+    };
+    let suspects: Vec<usize> = (0..count).into_par_iter().filter(|&quad| is_suspect(quad)).collect();
+    let boxes: Vec<[DVec3; 2]> = suspects.iter().map(|&quad| fit.patch_box(quad)).collect();
+    let mut found: BTreeMap<Vec<u32>, Vec<DVec3>> = BTreeMap::new();
+    for (quads, point) in crossings_in(fit, &boxes) {
+        if quads.iter().any(|&quad| !same[quad as usize]) {
+            found.entry(quads).or_default().push(point);
+        }
+    }
+    let carried = before.into_iter().flat_map(|before| &before.crossed);
+    for crossed in carried.filter(|c| c.quads.iter().all(|&q| same.get(q as usize) == Some(&true))) {
+        found.insert(crossed.quads.clone(), crossed.points.clone());
+    }
+    found.into_iter().map(|(quads, points)| Crossed { quads, points }).collect()
+}
+
+/// Where triangles of the surface of a fit pass through each other, in certain boxes at least, and their patches, the smaller first.
+fn crossings_in(fit: &Fit<'_>, boxes: &[[DVec3; 2]]) -> Vec<(Vec<u32>, DVec3)> {
+    if boxes.is_empty() {
+        return Vec::new();
+    }
+    let chord = CHORD * fit.setting.layout.part.mesh.diagonal();
+    let (surface, quads) = fit.rough_surface_in(boxes);
+    let (mesh, face_of_triangle) = surface.tessellate_with(chord, f64::INFINITY);
+    let of = |crossing: &topipe_mesh::spatial::Crossing| {
+        let faces = crossing.faces.map(|f| face_of_triangle[f.index()] as usize);
+        // What is no patch is a face of known shape.
+        let mut patches: Vec<u32> = faces.iter().filter_map(|&face| quads.get(face).copied()).collect();
+        patches.sort_unstable();
+        patches.dedup();
+        patches
+    };
+    let found = crossings(&mesh).into_iter().map(|crossing| (of(&crossing), crossing.point));
+    found.filter(|(patches, _)| !patches.is_empty()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Parameters;
+    use crate::setting::tests::layout;
+    use crate::tangent_fit::Given;
+    use topipe_progress::{Progress, Units};
+    use topipe_quad_matching::{Division, divide};
+
+    /// What is found around patches that nearly fold is what is found on the whole surface, and what is carried over is what would be
+    /// found again.
+    #[test]
+    fn crossings_are_found_once_and_carried_over() {
+        let (layout, _) = layout("monster-lite");
+        let parameters = Parameters { untangle: true, divisions: 1, ..Default::default() };
+        let (units, progress) = (Units::none(), Progress::silent());
+        let given = Given { parameters: &parameters, units: &units, progress: &progress };
+        let fit = Fit::new(&layout, given).unwrap();
+        assert!(!fit.crossed.is_empty());
+        let points = |crossed: &[Crossed]| crossed.iter().map(|c| c.points.len()).sum::<usize>();
+        let all = [[DVec3::NEG_INFINITY, DVec3::INFINITY]];
+        assert_eq!(points(&fit.crossed), crossings_in(&fit, &all).len());
+        // Once where they pass through each other, and once far from there.
+        let corners = fit.crossed[0].corners(&fit);
+        let nearest = layout.part.mesh.position(layout.vertices[corners[0] as usize]);
+        let off = |v: &u32| layout.part.mesh.position(layout.vertices[*v as usize]).distance(nearest);
+        let mut far: Vec<u32> = (0..layout.vertices.len() as u32).collect();
+        far.sort_by(|a, b| off(b).total_cmp(&off(a)));
+        for wanted in [corners, far] {
+            let Division { layout: finer, .. } = divide(&layout, &[wanted], &progress).unwrap().unwrap();
+            let divided = Fit::divided(&finer, &fit, given).unwrap();
+            assert_eq!(divided.crossed, crossed(&divided, None));
+        }
+    }
+}
