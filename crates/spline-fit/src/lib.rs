@@ -10,14 +10,14 @@
 //! vertices and the edges that are no features carry normals, found by local fits to the mesh, and every patch is fitted to
 //! them along its sides ([`Continuity::Tangent`], the default).
 //!
-//! Guarantees: each quad gives one patch, but where the tolerance asks for more, and each region face one analytic face; patches share their border curves (bit for
-//! bit where their knots are the same, else with knots inserted), so the surface is watertight; the result does not depend
-//! on the number of threads.
+//! Guarantees: each quad gives one patch, but where the tolerance or `untangle` asks for more, and each region face one analytic face;
+//! patches share their border curves (bit for bit where their knots are the same, else with knots inserted), so the surface is
+//! watertight; the result does not depend on the number of threads.
 //!
 //! Not guaranteed: a bound on the normal jump or on the deviation. Along edges knots are inserted until the normals agree
 //! to `max_normal_jump` or spans are very short; where the distance is larger than the tolerance curves are refined up to
-//! `refinements` times, then quads are divided up to `divisions` times. What remains is said in a remark and measured by validation. Patches of quads with corners near 180 degrees, or finer
-//! than the mesh, may fold inside.
+//! `refinements` times, then quads are divided up to `divisions` times. What remains is said in a remark and measured by validation.
+//! Patches of quads with corners near 180 degrees, or finer than the mesh, may fold inside; `untangle` divides most of them.
 
 mod adapt;
 mod analytic_face;
