@@ -24,6 +24,11 @@ use topipe_quad_matching::QuadLayout;
 /// Curves stay within this share of the part's diagonal of the shapes they lie on: 1e-7 mm on a part of 200 mm.
 const TOLERANCE: f64 = 5e-10;
 
+/// The connectivity of the mesh of a layout.
+pub(crate) fn connectivity(layout: &QuadLayout) -> Result<Connectivity, SplineFitError> {
+    Connectivity::build(&layout.part.mesh).map_err(|error| SplineFitError::Layout(error.to_string()))
+}
+
 /// The fixed parts of a surface: everything that touches a region face.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Borders {
@@ -40,8 +45,8 @@ pub(crate) struct Borders {
 
 /// Finds the borders of all region faces of `layout`.
 ///
-/// Fails when the layout's arrays do not fit together.
-pub(crate) fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
+/// `connectivity` is that of the layout's mesh. Fails when the layout's arrays do not fit together.
+pub(crate) fn borders(layout: &QuadLayout, connectivity: &Connectivity) -> Result<Borders, SplineFitError> {
     let sides = sides(layout)?;
     let diagonal = layout.part.mesh.diagonal();
     let tolerance = TOLERANCE * diagonal;
@@ -93,11 +98,9 @@ pub(crate) fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
     for chain in chains::chains(layout, &sides, &borders.curves, grain) {
         outline::fit(layout, &chain, &shapes[chain.region.index()], grain, diagonal, &room, &mut borders);
     }
-    let connectivity =
-        Connectivity::build(&layout.part.mesh).map_err(|error| SplineFitError::Layout(error.to_string()))?;
     for e in 0..layout.edges.len() {
         if let Some(curve) = &mut borders.curves[e] {
-            curve.feature = sharpness::feature(layout, &connectivity, e, sides[e], &shapes);
+            curve.feature = sharpness::feature(layout, connectivity, e, sides[e], &shapes);
         }
     }
     Ok(borders)
@@ -246,6 +249,10 @@ mod tests {
     use std::f64::consts::TAU;
     use topipe_mesh::{Part, Region, VertexId};
     use topipe_quad_matching::{MacroEdge, RegionFace, Side};
+
+    fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
+        super::borders(layout, &Connectivity::build(&layout.part.mesh).unwrap())
+    }
 
     const SECTORS: u32 = 64;
     const HOLE: f64 = 3.0;

@@ -37,7 +37,8 @@ pub(crate) fn fit(
         surface = solve(layout, &basis, &samples, parameters, progress)?;
         progress.step(round + 1, rounds, "rounds");
     }
-    crate::adapt::adapt(&mut surface, crate::borders::borders(layout)?)
+    let connectivity = crate::borders::connectivity(layout)?;
+    crate::adapt::adapt(&mut surface, crate::borders::borders(layout, &connectivity)?)
         .ok_or_else(|| SplineFitError::Layout("knots of edges do not fit".into()))?;
     Ok(surface)
 }

@@ -2,13 +2,13 @@
 
 use crate::SplineFitError;
 use crate::borders::sharpness;
-use crate::borders::{Borders, borders};
+use crate::borders::{Borders, borders, connectivity};
 use crate::corners::{Corners, corners};
 use crate::fans::{EdgeRole, Sectors, quads_beside};
 use crate::frames::{Given, crease_tangents};
 use crate::samples::PatchSamples;
 use std::sync::Arc;
-use topipe_mesh::{Connectivity, FeatureKind, RegionShape};
+use topipe_mesh::{FeatureKind, RegionShape};
 use topipe_progress::Progress;
 use topipe_quad_matching::QuadLayout;
 
@@ -37,10 +37,9 @@ pub(crate) struct Setting<'a> {
 
 impl<'a> Setting<'a> {
     pub(crate) fn new(layout: &'a QuadLayout) -> Result<Self, SplineFitError> {
-        let borders = borders(layout)?;
         let mesh = &layout.part.mesh;
-        let connectivity =
-            Connectivity::build(mesh).map_err(|error| SplineFitError::Layout(error.to_string()))?;
+        let connectivity = connectivity(layout)?;
+        let borders = borders(layout, &connectivity)?;
         let beside = quads_beside(layout);
         let (mut roles, mut features) = (Vec::new(), Vec::new());
         for (e, edge) in layout.edges.iter().enumerate() {
