@@ -40,29 +40,27 @@ impl Crossed {
     }
 }
 
-/// All of them in a fit, by their patches; what was there `before` and is the same is not looked for again.
+/// All of them in a fit, by their patches; what was there `before` and has nothing beside it that has changed is not looked for again.
 pub(crate) fn crossed(fit: &Fit<'_>, before: Option<&Fit<'_>>) -> Vec<Crossed> {
     let layout = fit.setting.layout;
     let count = layout.quads.len();
-    let same: Vec<bool> =
-        (0..count).map(|quad| before.is_some_and(|before| fit.has_same_patch(before, quad))).collect();
+    let is_same = |quad: usize| before.is_some_and(|before| fit.has_same_patch(before, quad));
     let mut beside_changed = vec![false; layout.vertices.len()];
-    for quad in (0..count).filter(|&quad| !same[quad]) {
+    for quad in (0..count).filter(|&quad| !is_same(quad)) {
         layout.corners(quad).into_iter().for_each(|v| beside_changed[v as usize] = true);
     }
-    let is_suspect = |quad: usize| {
-        layout.corners(quad).into_iter().any(|v| beside_changed[v as usize]) && fit.nearly_folds(quad)
-    };
-    let suspects: Vec<usize> = (0..count).into_par_iter().filter(|&quad| is_suspect(quad)).collect();
-    let boxes: Vec<[DVec3; 2]> = suspects.iter().map(|&quad| fit.patch_box(quad)).collect();
+    let is_open = |quad: usize| layout.corners(quad).into_iter().any(|v| beside_changed[v as usize]);
+    let open: Vec<bool> = (0..count).map(is_open).collect();
+    let suspects = (0..count).into_par_iter().filter(|&quad| open[quad] && fit.nearly_folds(quad));
+    let boxes: Vec<[DVec3; 2]> = suspects.map(|quad| fit.patch_box(quad)).collect();
     let mut found: BTreeMap<Vec<u32>, Vec<DVec3>> = BTreeMap::new();
     for (quads, point) in crossings_in(fit, &boxes) {
-        if quads.iter().any(|&quad| !same[quad as usize]) {
+        if quads.iter().any(|&quad| open[quad as usize]) {
             found.entry(quads).or_default().push(point);
         }
     }
     let carried = before.into_iter().flat_map(|before| &before.crossed);
-    for crossed in carried.filter(|c| c.quads.iter().all(|&q| same.get(q as usize) == Some(&true))) {
+    for crossed in carried.filter(|c| c.quads.iter().all(|&q| open.get(q as usize) == Some(&false))) {
         found.insert(crossed.quads.clone(), crossed.points.clone());
     }
     found.into_iter().map(|(quads, points)| Crossed { quads, points }).collect()
@@ -74,7 +72,7 @@ fn crossings_in(fit: &Fit<'_>, boxes: &[[DVec3; 2]]) -> Vec<(Vec<u32>, DVec3)> {
         return Vec::new();
     }
     let chord = CHORD * fit.setting.layout.part.mesh.diagonal();
-    let (surface, quads) = fit.rough_surface_in(boxes);
+    let (surface, quads) = fit.surface_in(boxes);
     let (mesh, face_of_triangle) = surface.tessellate_with(chord, f64::INFINITY);
     let of = |crossing: &topipe_mesh::spatial::Crossing| {
         let faces = crossing.faces.map(|f| face_of_triangle[f.index()] as usize);

@@ -1,9 +1,9 @@
 //! More patches where knots are not enough.
 //!
 //! A fit is measured against the tolerance, see [`crate::beyond`]; around places beyond it, and on demand where patches pass through each
-//! other, see [`crate::crossed`], the layout is divided, see [`topipe_quad_matching::divide`], and fitted again. A division of the patch that a place lies in can be around any of its corners,
-//! and which of them helps is seen afterwards only: where one does not, another is tried. Fits to divisions take over what these leave
-//! as it was, so that a trial costs a small part of a fit.
+//! other, see [`crate::crossed`], the layout is divided, see [`topipe_quad_matching::divide`], and fitted again. A division of the patch
+//! that a place lies in can be around any of its corners, and which of them helps is seen afterwards only: where one does not, another
+//! is tried. Fits to divisions take over what these leave as it was, so that a trial costs a small part of a fit.
 
 use crate::beyond::Beyond;
 use crate::score::Scores;

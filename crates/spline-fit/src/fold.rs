@@ -10,8 +10,8 @@ use topipe_mesh::DVec3;
 const NEAR: f64 = 0.04;
 
 /// Where a normal makes this angle with those at the corners, 37 degrees, or a larger one, a patch may be turned over between the points
-/// of the grid, or pass through a slender one beside it: the cosine. With 53 and with 73 degrees one of the places of the bridge is not
-/// found (9 pairs of triangles cross in the end for 4).
+/// of the grid, with the knots that are inserted afterwards, or pass through a slender one beside it: the cosine. With 53 and with 73
+/// degrees one of the places of the bridge was not found, without these knots.
 const NEARLY: f64 = 0.8;
 
 impl Net {

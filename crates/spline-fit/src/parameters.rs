@@ -37,8 +37,8 @@ pub struct Parameters {
     /// Rounds in which patches around places beyond the tolerance are divided, each into three; 0 = the patches stay those of the
     /// layout.
     pub divisions: u32,
-    /// Whether patches are divided in these rounds also where they pass through themselves or each other. That takes away nine in ten
-    /// such places, for some tenths of the time of the fit for each trial.
+    /// Whether patches are divided in these rounds also where they pass through themselves or each other, triangulated to 5e-4 of the
+    /// diagonal. Each trial takes some tenths of the time of the fit.
     pub untangle: bool,
     /// Largest angle between the normals of two patches along an edge that is no feature, degrees; knots are inserted
     /// where it is exceeded, down to spans of 1/32768 of an edge, in patches of bounded size.

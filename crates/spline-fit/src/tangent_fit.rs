@@ -147,11 +147,12 @@ impl<'a> Fit<'a> {
         if parameters.divisions > 0 {
             fit.refinement.index(&fit.setting);
         }
-        // Knots come in rounds that not all threads are busy in. Where divisions are likely they can wait: the next fit may be better.
-        let is_last = before.is_none() && !parameters.untangle;
+        // Knots come in rounds that not all threads are busy in. After a division they can wait, as the next one may be better, unless
+        // patches are looked at that fold with them only.
+        let are_needed = before.is_none() || parameters.untangle;
         (fit.beyond, fit.nets) = rayon::join(
             || fit.measured(parameters, before),
-            || is_last.then(|| fit.with_knots(parameters, progress)),
+            || are_needed.then(|| fit.with_knots(parameters, progress)),
         );
         // Without places beyond the tolerance nothing is to be divided, and whoever does so wants to know whether it does harm.
         if parameters.divisions > 0 && (parameters.untangle || before.is_some() || !fit.beyond.is_empty()) {
@@ -208,7 +209,12 @@ impl<'a> Fit<'a> {
 
     /// A box around a patch, that of its control points.
     pub(crate) fn patch_box(&self, quad: usize) -> [DVec3; 2] {
-        extent(self.round.fitted[quad].net.control.iter().copied())
+        extent(self.net(quad).control.iter().copied())
+    }
+
+    /// A patch, with knots if they were inserted already.
+    fn net(&self, quad: usize) -> &Net {
+        self.nets.as_ref().map_or_else(|| &self.round.fitted[quad].net, |nets| &nets[quad])
     }
 
     fn with_knots(&self, parameters: &Parameters, progress: &Progress) -> Vec<Net> {
@@ -216,15 +222,15 @@ impl<'a> Fit<'a> {
         insert_knots(&self.setting, &network.curves, fitted, parameters.max_normal_jump, progress)
     }
 
-    /// The part of the surface that may be in certain boxes, without these knots: it is in the same places as with them, with larger
-    /// angles between patches. And the quads of its patches.
-    pub(crate) fn rough_surface_in(&self, boxes: &[[DVec3; 2]]) -> (SplineSurface, Vec<u32>) {
+    /// The part of the surface that may be in certain boxes, and the quads of its patches; without knots where they were not inserted
+    /// yet: then angles between patches are larger, and places where patches fold that follow their normals closely are not seen.
+    pub(crate) fn surface_in(&self, boxes: &[[DVec3; 2]]) -> (SplineSurface, Vec<u32>) {
         let is_in =
             |[low, high]: [DVec3; 2]| boxes.iter().any(|[l, h]| low.cmple(*h).all() && high.cmpge(*l).all());
         let Round { network, fitted, .. } = &self.round;
         let quads = (0..fitted.len() as u32).into_par_iter();
         let quads: Vec<u32> = quads.filter(|&quad| is_in(self.patch_box(quad as usize))).collect();
-        let nets = quads.iter().map(|&quad| (quad as usize, fitted[quad as usize].net.clone()));
+        let nets = quads.iter().map(|&quad| (quad as usize, self.net(quad as usize).clone()));
         let mut surface = assemble(&self.setting, network, nets);
         let edges = &surface.edges;
         surface.faces.retain(|face| {

@@ -287,6 +287,8 @@ input = "tiles"
 [stage.surface]
 kind = "spline-fit"
 input = "quads"
+untangle = true                     # no patch passes through another one; without it the fit is faster
+# tolerance = 1e-3                  # 0.1 % of the diagonal: nearer to the mesh, more patches
 {frame}{about}
 [stage.check]                       # measures all of it: report.json, report.html
 kind = "validation"
