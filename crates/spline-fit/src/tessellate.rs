@@ -110,7 +110,9 @@ impl SplineSurface {
         let mut used = vec![false; self.edges.len()];
         let of_faces = self.faces.iter().flat_map(|face| face.loops.iter().flatten());
         let sides = self.patches.iter().flat_map(|patch| &patch.sides).chain(of_faces);
-        sides.for_each(|side| used[side.edge as usize] = true);
+        for side in sides {
+            used.get_mut(side.edge as usize).into_iter().for_each(|used| *used = true);
+        }
         // Points along each edge, ends included, as mesh vertices.
         let edges: Vec<Vec<VertexId>> = self
             .edges
