@@ -156,7 +156,10 @@ impl<'a> Fit<'a> {
         );
         // Without places beyond the tolerance nothing is to be divided, and whoever does so wants to know whether it does harm.
         if parameters.divisions > 0 && (parameters.untangle || before.is_some() || !fit.beyond.is_empty()) {
+            // With knots in all fits or in none: they are compared.
+            let kept = if parameters.untangle { None } else { fit.nets.take() };
             fit.crossed = crossed::crossed(&fit, before);
+            fit.nets = fit.nets.take().or(kept);
         }
         Ok(fit)
     }
