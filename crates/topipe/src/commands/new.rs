@@ -257,9 +257,9 @@ fn pipeline(name: &str, path: &str, output: &Path, looked: &Looked) -> String {
         ("", "", String::new(), NO_FRAME)
     };
     let untangle = if looked.triangles <= UNTANGLED {
-        "untangle = true                     # no patch passes through another one; without it the fit is faster"
+        "untangle = true                     # divides patches that pass through each other; without it the fit is faster"
     } else {
-        "# untangle = true                   # no patch passes through another one; takes minutes on this mesh"
+        "# untangle = true                   # divides patches that pass through each other; takes minutes on this mesh"
     };
     let _ = write!(
         text,
