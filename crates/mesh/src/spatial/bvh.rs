@@ -8,16 +8,12 @@
 //! built in 0.4 to 0.8 of its time, nearest points near the surface in 0.7 to 0.9, far from it in 0.8 to 1.0, rays in
 //! 0.6 to 0.9. Of 20,000 rays aimed at vertices parry lost 72, this index none.
 
+use super::construction::{SAH_DEPTH, tree};
 use super::triangle::{Crossing, cross};
 use crate::{FaceId, TriangleMesh};
 use glam::DVec3;
+use rayon::prelude::*;
 
-/// Triangles in a leaf at most, where splitting further does not pay.
-const LEAF: usize = 4;
-/// Bins of the surface area heuristic.
-const BINS: usize = 16;
-/// Below this depth nodes are split in the middle of the list, so that the depth stays bounded by this plus 32.
-const SAH_DEPTH: u32 = 60;
 /// Room for one sibling per level.
 pub(super) const STACK: usize = SAH_DEPTH as usize + 36;
 
@@ -31,10 +27,10 @@ pub(crate) const DIRECTIONS: [DVec3; 6] = [
     DVec3::new(-0.8839, 0.1427, 0.4453),
 ];
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Node {
-    low: DVec3,
-    high: DVec3,
+    pub(super) low: DVec3,
+    pub(super) high: DVec3,
     /// Leaf: the first triangle. Inner node: the first of its two children.
     pub(super) first: u32,
     /// Triangles of a leaf; 0 for an inner node.
@@ -135,22 +131,10 @@ pub struct SurfaceIndex {
 impl SurfaceIndex {
     /// Arranges the faces of `mesh`; positions must be finite. `O(n log n)`.
     pub fn build(mesh: &TriangleMesh) -> Self {
-        let item = |f: FaceId| {
-            let [a, b, c] = mesh.corners(f);
-            Item { low: a.min(b).min(c), high: a.max(b).max(c), face: f }
-        };
-        let items: Vec<Item> = mesh.faces().map(item).collect();
-        let mut builder = Builder {
-            spare: Vec::with_capacity(items.len()),
-            nodes: Vec::with_capacity(items.len() + 1),
-            items,
-        };
-        builder.build();
-        let faces: Vec<FaceId> = builder.items.iter().map(|item| item.face).collect();
-        let corners = faces.iter().map(|&f| mesh.corners(f)).collect();
-        let pairs =
-            builder.nodes.get(1..).unwrap_or_default().as_chunks().0.iter().copied().map(Pair::new).collect();
-        Self { root: builder.nodes.first().copied(), pairs, faces, corners }
+        let (nodes, faces) = tree(mesh);
+        let corners = faces.par_iter().map(|&f| mesh.corners(f)).collect();
+        let pairs = nodes.get(1..).unwrap_or_default().as_chunks().0.iter().copied().map(Pair::new).collect();
+        Self { root: nodes.first().copied(), pairs, faces, corners }
     }
 
     #[inline]
@@ -316,162 +300,6 @@ impl SurfaceIndex {
     }
 }
 
-/// A face while the tree is built.
-#[derive(Debug, Clone, Copy)]
-struct Item {
-    low: DVec3,
-    high: DVec3,
-    face: FaceId,
-}
-
-impl Item {
-    /// Twice the centre of the box, which is as good.
-    #[inline]
-    fn center(&self) -> DVec3 {
-        self.low + self.high
-    }
-}
-
-/// What some items need: a box around them, and one around their centres.
-#[derive(Debug, Clone, Copy)]
-struct Extent {
-    low: DVec3,
-    high: DVec3,
-    centers: [DVec3; 2],
-    count: usize,
-}
-
-impl Extent {
-    const NOTHING: Self = Self {
-        low: DVec3::INFINITY,
-        high: DVec3::NEG_INFINITY,
-        centers: [DVec3::INFINITY, DVec3::NEG_INFINITY],
-        count: 0,
-    };
-
-    #[inline]
-    fn add(&mut self, item: &Item) {
-        let center = item.center();
-        self.low = self.low.min(item.low);
-        self.high = self.high.max(item.high);
-        self.centers = [self.centers[0].min(center), self.centers[1].max(center)];
-        self.count += 1;
-    }
-
-    #[inline]
-    fn and(&self, other: &Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-            centers: [self.centers[0].min(other.centers[0]), self.centers[1].max(other.centers[1])],
-            count: self.count + other.count,
-        }
-    }
-
-    fn of(items: &[Item]) -> Self {
-        let mut extent = Self::NOTHING;
-        items.iter().for_each(|item| extent.add(item));
-        extent
-    }
-}
-
-/// Items are moved, not numbers of them, so that each level of the tree reads memory forwards; boxes of children come from the
-/// bins of their parent.
-struct Builder {
-    items: Vec<Item>,
-    spare: Vec<Item>,
-    nodes: Vec<Node>,
-}
-
-impl Builder {
-    fn build(&mut self) {
-        if self.items.is_empty() {
-            return;
-        }
-        let all = Extent::of(&self.items);
-        self.nodes.push(leaf(0, &all));
-        let mut open = vec![(0usize, 0u32, all)];
-        while let Some((index, depth, extent)) = open.pop() {
-            let first = self.nodes[index].first as usize;
-            let Some([lower, upper]) = self.split(first, &extent, depth) else { continue };
-            let child = self.nodes.len();
-            self.nodes.push(leaf(first, &lower));
-            self.nodes.push(leaf(first + lower.count, &upper));
-            self.nodes[index].first = child as u32;
-            self.nodes[index].count = 0;
-            open.push((child + 1, depth + 1, upper));
-            open.push((child, depth + 1, lower));
-        }
-    }
-
-    /// Splits the items from `first` on, after reordering them; `None` for a leaf.
-    fn split(&mut self, first: usize, extent: &Extent, depth: u32) -> Option<[Extent; 2]> {
-        let count = extent.count;
-        if count <= LEAF {
-            return None;
-        }
-        let items = &mut self.items[first..first + count];
-        let halves = |items: &[Item]| {
-            let (lower, upper) = items.split_at(count / 2);
-            Some([Extent::of(lower), Extent::of(upper)])
-        };
-        let [low, high] = extent.centers;
-        let lengths = high - low;
-        let axis = lengths.max_position();
-        if depth >= SAH_DEPTH || lengths[axis] <= 0.0 {
-            return halves(items);
-        }
-        let scale = BINS as f64 / lengths[axis];
-        let bin_of = |item: &Item| (((item.center()[axis] - low[axis]) * scale) as usize).min(BINS - 1);
-        let mut bins = [Extent::NOTHING; BINS];
-        for item in &*items {
-            bins[bin_of(item)].add(item);
-        }
-        let cost = |extent: &Extent| half_area(extent.low, extent.high) * extent.count as f64;
-        let mut right = [Extent::NOTHING; BINS];
-        right[BINS - 1] = bins[BINS - 1];
-        for k in (1..BINS - 1).rev() {
-            right[k] = right[k + 1].and(&bins[k]);
-        }
-        let mut left = Extent::NOTHING;
-        let mut best: Option<(f64, usize, Extent)> = None;
-        for k in 1..BINS {
-            left = left.and(&bins[k - 1]);
-            if left.count == 0 || left.count == count {
-                continue;
-            }
-            let cost = cost(&left) + cost(&right[k]);
-            if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-                best = Some((cost, k, left));
-            }
-        }
-        let Some((_, cut, lower)) = best else { return halves(items) };
-        // Stable partition: the order within each side, and so every answer, depends on the mesh alone.
-        self.spare.clear();
-        let mut kept = 0;
-        for k in 0..count {
-            let item = items[k];
-            if bin_of(&item) < cut {
-                items[kept] = item;
-                kept += 1;
-            } else {
-                self.spare.push(item);
-            }
-        }
-        items[kept..].copy_from_slice(&self.spare);
-        Some([lower, right[cut]])
-    }
-}
-
-fn leaf(first: usize, extent: &Extent) -> Node {
-    Node { low: extent.low, high: extent.high, first: first as u32, count: extent.count as u32 }
-}
-
 fn extent([a, b, c]: [DVec3; 3]) -> (DVec3, DVec3) {
     (a.min(b).min(c), a.max(b).max(c))
-}
-
-fn half_area(low: DVec3, high: DVec3) -> f64 {
-    let d = high - low;
-    if d.x < 0.0 { 0.0 } else { d.x * d.y + d.y * d.z + d.z * d.x }
 }

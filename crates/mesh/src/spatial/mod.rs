@@ -6,6 +6,7 @@
 //! [`SurfaceIndex::contains`] means something only for closed surfaces.
 
 mod bvh;
+mod construction;
 mod crossing;
 mod curve;
 mod deviation;
