@@ -7,6 +7,7 @@ mod trimmed;
 
 use crate::surface::Column;
 use crate::{Basis, CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface};
+use rayon::prelude::*;
 use topipe_mesh::{DVec3, RegionShape, TriangleMesh, VertexId};
 
 /// Divisions of one edge or one side of a patch's grid at the most: finer than that is a tolerance out of reach.
@@ -113,24 +114,23 @@ impl SplineSurface {
         for side in sides {
             used.get_mut(side.edge as usize).into_iter().for_each(|used| *used = true);
         }
+        let inner = |e: usize| -> Vec<DVec3> {
+            let edge = &self.edges[e];
+            let count = if used[e] { edge_divisions(edge, tolerances[e]) } else { 1 };
+            (1..count).map(|k| edge.exact(k as f64 / count as f64).position).collect()
+        };
+        let inner: Vec<Vec<DVec3>> = (0..self.edges.len()).into_par_iter().map(inner).collect();
         // Points along each edge, ends included, as mesh vertices.
         let edges: Vec<Vec<VertexId>> = self
             .edges
             .iter()
-            .zip(tolerances)
-            .zip(used)
-            .map(|((edge, &tolerance), used)| {
-                if !used {
-                    return Vec::new();
-                }
-                let count = edge_divisions(edge, tolerance);
-                let mut points = vec![VertexId(edge.ends[0])];
-                for k in 1..count {
-                    points.push(VertexId::new(mesh.positions.len()));
-                    mesh.positions.push(edge.exact(k as f64 / count as f64).position);
-                }
-                points.push(VertexId(edge.ends[1]));
-                points
+            .zip(inner)
+            .map(|(edge, inner)| {
+                let first = mesh.positions.len();
+                mesh.positions.extend(inner);
+                let numbers = (first..mesh.positions.len()).map(VertexId::new);
+                let [start, end] = edge.ends.map(VertexId);
+                std::iter::once(start).chain(numbers).chain([end]).collect()
             })
             .collect();
         let along = |side: &PatchSide| {
@@ -141,9 +141,29 @@ impl SplineSurface {
             points
         };
         let mut face_of_triangle = Vec::new();
-        for (p, patch) in self.patches.iter().enumerate().filter(|_| patches) {
+        let patches = if patches { &self.patches[..] } else { &[] };
+        let grids = patches.par_iter().map(|patch| {
             let sides: Vec<Vec<VertexId>> = patch.sides.iter().map(along).collect();
-            add_patch(&mut mesh, patch, &sides, tolerance);
+            let size = grid_size(patch, &sides, tolerance);
+            (grid(patch, size), sides, size)
+        });
+        let grids: Vec<_> = grids.collect();
+        let mut next = mesh.positions.len();
+        let mut firsts = Vec::with_capacity(grids.len());
+        for (points, ..) in &grids {
+            firsts.push(next);
+            next += points.len();
+        }
+        let triangles = grids
+            .par_iter()
+            .zip(firsts)
+            .map(|((_, sides, size), first)| patch_triangles(sides, *size, first));
+        let triangles: Vec<Vec<[VertexId; 3]>> = triangles.collect();
+        mesh.positions.reserve(next - mesh.positions.len());
+        mesh.triangles.reserve(triangles.iter().map(Vec::len).sum());
+        for (p, ((points, ..), triangles)) in grids.into_iter().zip(triangles).enumerate() {
+            mesh.positions.extend(points);
+            mesh.triangles.extend(triangles);
             face_of_triangle.resize(mesh.triangles.len(), p as u32);
         }
         let mut crossing = Vec::new();
@@ -192,21 +212,26 @@ fn grid_size(patch: &Patch, sides: &[Vec<VertexId>], tolerance: f64) -> (usize, 
     (along_u.max(longest(0, 2)), along_v.max(longest(1, 3)))
 }
 
-fn add_patch(mesh: &mut TriangleMesh, patch: &Patch, sides: &[Vec<VertexId>], tolerance: f64) {
-    let (nu, nv) = grid_size(patch, sides, tolerance);
-    let first = mesh.positions.len();
-    // Inner grid points (i, j) with 1 <= i < nu, 1 <= j < nv.
+/// The inner points (i, j) of a grid, with 1 <= i < nu and 1 <= j < nv.
+fn grid(patch: &Patch, (nu, nv): (usize, usize)) -> Vec<DVec3> {
     let columns: Vec<Column> =
         (1..nu).map(|i| patch.column(&patch.basis_u.evaluate(i as f64 / nu as f64))).collect();
+    let mut points = Vec::with_capacity((nu - 1) * (nv - 1));
     for j in 1..nv {
         let row = patch.basis_v.evaluate(j as f64 / nv as f64);
-        mesh.positions.extend(columns.iter().map(|column| column.evaluate(&row).position));
+        points.extend(columns.iter().map(|column| column.evaluate(&row).position));
     }
+    points
+}
+
+/// The triangles of a patch; `first` is the number of the first inner point of its grid.
+fn patch_triangles(sides: &[Vec<VertexId>], (nu, nv): (usize, usize), first: usize) -> Vec<[VertexId; 3]> {
+    let mut triangles = Vec::with_capacity(2 * nu * nv);
     let at = |i: usize, j: usize| VertexId::new(first + (j - 1) * (nu - 1) + i - 1);
     for j in 1..nv - 1 {
         for i in 1..nu - 1 {
-            mesh.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-            mesh.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
         }
     }
     // The ring of the grid facing each side, in the direction of the side.
@@ -217,12 +242,13 @@ fn add_patch(mesh: &mut TriangleMesh, patch: &Patch, sides: &[Vec<VertexId>], to
         (1..nv).rev().map(|j| (at(1, j), 1.0 - j as f64 / nv as f64)).collect(),
     ];
     for (side, ring) in sides.iter().zip(&rings) {
-        zip(mesh, side, ring);
+        zip(&mut triangles, side, ring);
     }
+    triangles
 }
 
 /// Joins a side (parameters 0 to 1, evenly spaced) to the ring inside of it, advancing on whichever is behind.
-fn zip(mesh: &mut TriangleMesh, side: &[VertexId], ring: &[(VertexId, f64)]) {
+fn zip(triangles: &mut Vec<[VertexId; 3]>, side: &[VertexId], ring: &[(VertexId, f64)]) {
     let last = side.len() - 1;
     let t = |k: usize| k as f64 / last as f64;
     let (mut i, mut j) = (0, 0);
@@ -231,10 +257,10 @@ fn zip(mesh: &mut TriangleMesh, side: &[VertexId], ring: &[(VertexId, f64)]) {
         let outer = if i < last { (t(i) + t(i + 1)) / 2.0 } else { f64::INFINITY };
         let inner = if j + 1 < ring.len() { (ring[j].1 + ring[j + 1].1) / 2.0 } else { f64::INFINITY };
         if outer <= inner {
-            mesh.triangles.push([side[i], side[i + 1], ring[j].0]);
+            triangles.push([side[i], side[i + 1], ring[j].0]);
             i += 1;
         } else {
-            mesh.triangles.push([side[i], ring[j + 1].0, ring[j].0]);
+            triangles.push([side[i], ring[j + 1].0, ring[j].0]);
             j += 1;
         }
     }
