@@ -13,6 +13,7 @@ use crate::fans::{EdgeRole, Sector, Spoke};
 use crate::frames::Given;
 use crate::local_surface::{Known, local_surface};
 use rayon::prelude::*;
+use std::cell::LazyCell;
 use topipe_mesh::DVec3;
 
 /// From this angle between the tangent plane that is asked for and the mesh's own on, there is a corner: cosine of 25
@@ -66,7 +67,8 @@ fn corner(
     let normal = |quads: &[(u32, u8)], spokes: &[Spoke]| {
         local_surface(&given.of_quads(quads), at, Known::Point, reach(spokes)).normal
     };
-    let own = normal(&sector.quads, &sector.spokes);
+    // Most borders run on straight, and meet no shape smoothly.
+    let own = LazyCell::new(|| normal(&sector.quads, &sector.spokes));
     let ends = [sector.spokes[0], sector.spokes[sector.spokes.len() - 1]];
     let directions = ends.map(|s| given.fixed_direction(s, tangents));
     let sharp: Vec<usize> = [0, 1]
@@ -75,14 +77,14 @@ fn corner(
             let shape = given.tangent_to[ends[k].edge as usize].as_ref();
             shape.is_some_and(|shape| {
                 let normal = shape.normal(at);
-                normal.dot(own) < FAR || directions[1 - k].is_some_and(|d| d.dot(normal).abs() > LEAVES)
+                directions[1 - k].is_some_and(|d| d.dot(normal).abs() > LEAVES) || normal.dot(*own) < FAR
             })
         })
         .map(|k| ends[k].edge as usize)
         .collect();
     let [a, b] = [directions[0]?, directions[1]?];
     let across = a.cross(b);
-    let twisted = across.length() > LEAVES && (across.normalize().dot(own).abs() < FAR);
+    let twisted = across.length() > LEAVES && (across.normalize().dot(*own).abs() < FAR);
     if !twisted || sector.quads.len() < 2 {
         return Some((None, sharp));
     }
