@@ -8,10 +8,9 @@
 //!
 //! Source: the template for one marked corner in the refinement of quadrilateral meshes (Schneiders 1996).
 
-use crate::cost::within_gates;
 use crate::ends::turn_ends;
 use crate::refine::{Regions, flood, middle_of};
-use crate::relax::{Effort, relax_beside};
+use crate::relax::{Effort, Incidence, relax, within_gates};
 use crate::sides::Tiled;
 use crate::spokes::{self, SpokeTask};
 use crate::{MacroEdge, Parameters, QuadLayout, QuadMatchingError, RegionFace, Side};
@@ -57,12 +56,10 @@ pub fn divide(
         if stars.is_empty() {
             break;
         }
-        let finer = divided(layout, &stars, progress)?;
-        let outside = outside(&finer, layout.quads.len(), &stars);
-        if outside.is_empty() {
-            return Ok(Some(Division { layout: finer, vertices }));
+        match divided(layout, &stars, progress)? {
+            Ok(layout) => return Ok(Some(Division { layout, vertices })),
+            Err(outside) => rejected.extend(outside),
         }
-        rejected.extend(outside);
     }
     Ok(None)
 }
@@ -130,12 +127,12 @@ fn sides_at(layout: &QuadLayout, quad: usize, k: usize) -> [Side; 2] {
     [layout.quads[quad][k], layout.quads[quad][(k + 3) % 4]]
 }
 
-/// The layout with the stars divided.
+/// The layout with the stars divided, or the vertices of those that leave a corner of the new quads outside the gates.
 fn divided(
     layout: &QuadLayout,
     stars: &[Star<'_>],
     progress: &Progress,
-) -> Result<QuadLayout, QuadMatchingError> {
+) -> Result<Result<QuadLayout, Vec<u32>>, QuadMatchingError> {
     let snap = Parameters::default().snap;
     let corners = || stars.iter().flat_map(|star| star.quads).copied();
     let mut tiled = Tiled::over(Refiner::new(&layout.part)?, layout.quad_of_face.clone());
@@ -169,25 +166,30 @@ fn divided(
     let region_faces = layout.region_faces.iter();
     let region_faces =
         region_faces.map(|face| RegionFace { region: face.region, loops: loops(face) }).collect();
-    tiled.tile_of_face = flood(&tiled, &edges, &quads)?;
-
     let mut new = vec![false; layout.quads.len()];
     new.resize(quads.len(), true);
     corners().for_each(|(quad, _)| new[quad] = true);
+    tiled.tile_of_face = flood(&tiled, &edges, &quads, |quad| new[quad])?;
+
     let sides = quads.iter().map(|quad| quad.to_vec()).collect();
     let mut regions = Regions { tiled, vertices, edges, sides };
+    let incidence = Incidence::of(&regions, new);
     // What has moved nothing would move nothing again.
     let mut idle = None;
     for effort in EFFORTS {
-        if idle != Some(effort) && relax_beside(&mut regions, &new, effort, snap, progress)? == 0 {
+        if idle != Some(effort) && relax(&mut regions, &incidence, effort, snap, progress)? == 0 {
             idle = Some(effort);
         }
     }
     turn_ends(&mut regions);
+    let outside = outside(&regions, layout.quads.len(), stars);
+    if !outside.is_empty() {
+        return Ok(Err(outside));
+    }
     let Regions { tiled, vertices, edges, .. } = regions;
     let quad_of_face = tiled.tile_of_face;
     let (part, _) = tiled.refiner.finish();
-    Ok(QuadLayout { part, vertices, edges, quads, quad_of_face, region_faces, ..*layout })
+    Ok(Ok(QuadLayout { part, vertices, edges, quads, quad_of_face, region_faces, ..*layout }))
 }
 
 /// Halves the edges at corners of quads.
@@ -295,9 +297,8 @@ fn halved(halves: &FxHashMap<u32, Halves>, sides: &[Side]) -> Vec<Side> {
 }
 
 /// Vertices whose division leaves a corner of the new quads outside the gates; `before` is the number of quads there were.
-fn outside(finer: &QuadLayout, before: usize, stars: &[Star<'_>]) -> Vec<u32> {
-    let angles = finer.corner_angles();
-    let bad = |quad: usize| !angles[quad].iter().all(|&angle| within_gates(angle));
+fn outside(finer: &Regions, before: usize, stars: &[Star<'_>]) -> Vec<u32> {
+    let bad = |quad: usize| !within_gates(finer, quad);
     let mut new = before;
     let mut found = Vec::new();
     for star in stars {

@@ -6,7 +6,7 @@
 use crate::ends::turn_ends;
 use crate::outlines::outlines;
 use crate::refine::{Quads, Regions, refine};
-use crate::relax::{Effort, relax};
+use crate::relax::{Effort, Incidence, relax};
 use crate::{Parameters, QuadLayout, QuadMatchingError, RegionFace, Side};
 use topipe_progress::Progress;
 use topipe_tiling::Tiling;
@@ -25,8 +25,9 @@ pub(crate) fn subdivide(
 ) -> Result<QuadLayout, QuadMatchingError> {
     let (mut regions, faces) = outlines(tiling)?;
     progress.check()?;
+    let incidence = Incidence::new(&regions);
     for _ in 0..2 * parameters.straightening_rounds {
-        relax(&mut regions, Effort::Straighten, parameters.snap, progress)?;
+        relax(&mut regions, &incidence, Effort::Straighten, parameters.snap, progress)?;
         regions = regions.coarsen()?;
     }
     let Quads { mut tiled, vertices, edges, quads, quad_of_face } =
@@ -34,8 +35,9 @@ pub(crate) fn subdivide(
     tiled.tile_of_face = quad_of_face;
     let sides = quads.iter().map(|quad| quad.to_vec()).collect();
     let mut fine = Regions { tiled, vertices, edges, sides };
+    let incidence = Incidence::new(&fine);
     for _ in 0..RELAXATION_ROUNDS {
-        let changed = relax(&mut fine, Effort::Improve, parameters.snap, progress)?;
+        let changed = relax(&mut fine, &incidence, Effort::Improve, parameters.snap, progress)?;
         fine = fine.coarsen()?;
         if changed == 0 {
             break;
@@ -43,7 +45,7 @@ pub(crate) fn subdivide(
     }
     let mut turned = turn_ends(&mut fine);
     for _ in 0..SEARCH_ROUNDS {
-        let changed = relax(&mut fine, Effort::Search, parameters.snap, progress)?;
+        let changed = relax(&mut fine, &incidence, Effort::Search, parameters.snap, progress)?;
         if changed == 0 {
             break;
         }

@@ -232,7 +232,7 @@ pub(crate) fn refine(regions: Regions, snap: f64, progress: &Progress) -> Result
             ]);
         }
     }
-    let quad_of_face = flood(&tiled, &fine, &quads)?;
+    let quad_of_face = flood(&tiled, &fine, &quads, |_| true)?;
     Ok(Quads { tiled, vertices, edges: fine, quads, quad_of_face })
 }
 
@@ -240,17 +240,21 @@ fn fine_middle(fine: &[MacroEdge], edge: u32) -> u32 {
     fine[2 * edge as usize].ends[1]
 }
 
-/// The quad of each face: what can be reached from a face beside its first side without crossing any side.
+/// The quad of each face. That of a quad that is `new` are those that can be reached from a face beside its first side without crossing
+/// any side; the others have the number of their tile.
 pub(crate) fn flood(
     tiled: &Tiled,
     edges: &[MacroEdge],
     quads: &[[Side; 4]],
+    new: impl Fn(usize) -> bool,
 ) -> Result<Vec<u32>, QuadMatchingError> {
     let key = |a: VertexId, b: VertexId| [a.min(b), a.max(b)];
+    let sides = quads.iter().enumerate().filter(|(q, _)| new(*q)).flat_map(|(_, sides)| sides);
     let blocked: FxHashSet<[VertexId; 2]> =
-        edges.iter().flat_map(|e| e.path.windows(2)).map(|w| key(w[0], w[1])).collect();
-    let mut quad_of_face = vec![u32::MAX; tiled.tile_of_face.len()];
-    for (q, quad) in quads.iter().enumerate() {
+        sides.flat_map(|side| edges[side.edge as usize].path.windows(2)).map(|w| key(w[0], w[1])).collect();
+    let kept = |&tile: &u32| if tile == u32::MAX || new(tile as usize) { u32::MAX } else { tile };
+    let mut quad_of_face: Vec<u32> = tiled.tile_of_face.iter().map(kept).collect();
+    for (q, quad) in quads.iter().enumerate().filter(|(q, _)| new(*q)) {
         let path = &edges[quad[0].edge as usize].path;
         let (a, b) =
             if quad[0].reversed { (path[path.len() - 1], path[path.len() - 2]) } else { (path[0], path[1]) };

@@ -8,6 +8,7 @@
 mod star;
 
 use crate::QuadMatchingError;
+use crate::Side;
 use crate::cost::{self, corner};
 use crate::disk::{Cuts, Disk, Numbers};
 use crate::pairing::face_angle;
@@ -45,19 +46,38 @@ enum Plan {
 /// All of them, in the order in which they are tried.
 const PLANS: [Plan; 3] = [Plan::Equal, Plan::Sheared, Plan::Length];
 
-/// Which corners meet where; relaxation changes none of it.
-struct Incidence {
+/// Which corners meet at the vertices of some regions, those that are marked; relaxation changes none of it.
+pub(crate) struct Incidence {
     fans: Vec<Vec<Fan>>,
+    marked: Vec<bool>,
 }
 
 impl Incidence {
-    fn new(regions: &Regions) -> Self {
+    /// At all vertices.
+    pub(crate) fn new(regions: &Regions) -> Self {
+        Self::of(regions, vec![true; regions.sides.len()])
+    }
+
+    pub(crate) fn of(regions: &Regions, marked: Vec<bool>) -> Self {
+        let ends = |side: &Side| {
+            let [first, last] = regions.edges[side.edge as usize].ends.map(|v| v as usize);
+            if side.reversed { [last, first] } else { [first, last] }
+        };
+        let mut wanted = vec![false; regions.vertices.len()];
+        for (sides, _) in regions.sides.iter().zip(&marked).filter(|(_, marked)| **marked) {
+            sides.iter().for_each(|side| wanted[ends(side)[0]] = true);
+        }
         let mut at: Vec<Vec<Corner>> = vec![Vec::new(); regions.vertices.len()];
         let mut along: FxHashMap<(u32, bool), Corner> = FxHashMap::default();
         for (r, sides) in regions.sides.iter().enumerate() {
             for (k, side) in sides.iter().enumerate() {
-                at[regions.edges[side.edge as usize].ends[side.reversed as usize] as usize].push((r, k));
-                along.insert((side.edge, side.reversed), (r, k));
+                let [start, end] = ends(side);
+                if wanted[start] {
+                    at[start].push((r, k));
+                }
+                if wanted[start] || wanted[end] {
+                    along.insert((side.edge, side.reversed), (r, k));
+                }
             }
         }
         let is_feature = |edge: u32| regions.edges[edge as usize].feature.is_some();
@@ -94,21 +114,22 @@ impl Incidence {
                 fans
             })
             .collect();
-        Self { fans }
+        Self { fans, marked }
     }
 }
 
 /// A fan that is to be relaxed, and the number of its vertex.
 type Task<'a> = (usize, &'a Fan);
 
-/// The fans of more than one corner in rounds: those of one round have no region in common, and of two that have one the first
-/// comes in an earlier round. Round after round so gives what one after the other would.
-fn rounds(regions: usize, incidence: &Incidence) -> Vec<Vec<Task<'_>>> {
+/// The fans of more than one corner, one of them worth it, in rounds: those of one round have no region in common, and of two that
+/// have one the first comes in an earlier round. Round after round so gives what one after the other would.
+fn rounds<'a>(incidence: &'a Incidence, worth: &[bool]) -> Vec<Vec<Task<'a>>> {
     let mut rounds: Vec<Vec<Task<'_>>> = Vec::new();
     // The round from which on each region is free.
-    let mut free = vec![0; regions];
+    let mut free = vec![0; worth.len()];
+    let is_worth = |fan: &&Fan| fan.corners.len() > 1 && fan.corners.iter().any(|&(r, _)| worth[r]);
     for (v, fans) in incidence.fans.iter().enumerate() {
-        for fan in fans.iter().filter(|fan| fan.corners.len() > 1) {
+        for fan in fans.iter().filter(is_worth) {
             let round = fan.corners.iter().map(|&(r, _)| free[r]).max().unwrap_or(0);
             fan.corners.iter().for_each(|&(r, _)| free[r] = round + 1);
             if round == rounds.len() {
@@ -131,40 +152,29 @@ pub(crate) enum Effort {
     Search,
 }
 
-/// Sweeps over all macro-vertices that are worth the effort. Returns how many were moved or had their edges cut anew.
+/// Sweeps over all vertices of the marked regions that are worth the effort; other regions change where they have a vertex in common
+/// with these. Returns how many vertices were moved or had their edges cut anew.
 pub(crate) fn relax(
     regions: &mut Regions,
-    effort: Effort,
-    snap: f64,
-    progress: &Progress,
-) -> Result<usize, QuadMatchingError> {
-    relax_beside(regions, &vec![true; regions.sides.len()], effort, snap, progress)
-}
-
-/// The same at vertices of the regions that are marked; the others change where they have a vertex in common with these.
-pub(crate) fn relax_beside(
-    regions: &mut Regions,
-    marked: &[bool],
+    incidence: &Incidence,
     effort: Effort,
     snap: f64,
     progress: &Progress,
 ) -> Result<usize, QuadMatchingError> {
     let worth: Vec<bool> = (0..regions.sides.len())
-        .map(|r| marked[r] && (effort != Effort::Search || !within_gates(regions, r)))
+        .map(|r| incidence.marked[r] && (effort != Effort::Search || !within_gates(regions, r)))
         .collect();
     if !worth.contains(&true) {
         return Ok(0);
     }
-    let incidence = Incidence::new(regions);
-    let mut rounds = rounds(regions.sides.len(), &incidence);
-    for round in &mut rounds {
-        round.retain(|(_, fan)| fan.corners.iter().any(|&(r, _)| worth[r]));
-    }
+    let rounds = rounds(incidence, &worth);
     let all: usize = rounds.iter().map(Vec::len).sum();
+    let mut cut = vec![false; regions.sides.len()];
+    rounds.iter().flatten().flat_map(|(_, fan)| &fan.corners).for_each(|&(r, _)| cut[r] = true);
     let mut faces: Vec<Vec<FaceId>> = vec![Vec::new(); regions.sides.len()];
     for (f, &r) in regions.tiled.tile_of_face.iter().enumerate() {
-        if let Some(faces) = faces.get_mut(r as usize) {
-            faces.push(FaceId::new(f));
+        if cut.get(r as usize) == Some(&true) {
+            faces[r as usize].push(FaceId::new(f));
         }
     }
     let (mut done, mut changed) = (0, 0);
@@ -187,7 +197,7 @@ pub(crate) fn relax_beside(
 }
 
 /// Whether all corners of a region are within the gates.
-fn within_gates(regions: &Regions, r: usize) -> bool {
+pub(crate) fn within_gates(regions: &Regions, r: usize) -> bool {
     regions.sides[r].iter().all(|side| {
         let start = regions.edges[side.edge as usize].ends[side.reversed as usize];
         cost::within_gates(regions.tiled.corner_angle(regions.vertices[start as usize], r as u32))
@@ -423,12 +433,14 @@ mod tests {
             .map(|regions| vec![fan(regions)])
             .into_iter()
             .collect();
-        let incidence = Incidence { fans };
-        let rounds = rounds(6, &incidence);
-        let vertices: Vec<Vec<usize>> =
-            rounds.iter().map(|round| round.iter().map(|task| task.0).collect()).collect();
+        let incidence = Incidence { fans, marked: vec![true; 6] };
+        let vertices = |worth: &[bool]| -> Vec<Vec<usize>> {
+            let rounds = rounds(&incidence, worth);
+            rounds.iter().map(|round| round.iter().map(|task| task.0).collect()).collect()
+        };
         // That of one corner has nothing to relax.
-        assert_eq!(vertices, [vec![0, 2], vec![1, 5], vec![3]]);
+        assert_eq!(vertices(&[true; 6]), [vec![0, 2], vec![1, 5], vec![3]]);
+        assert_eq!(vertices(&[false, false, true, false, false, true]), [vec![1, 5], vec![3]]);
     }
 
     #[test]
