@@ -316,9 +316,9 @@ mod tests {
             let normal = bent.net.evaluate(0.5, 0.5).normal();
             let (width, height) = (bent.net.basis_u.len(), bent.net.basis_v.len());
             // One control point, so that it swings between places of the grid.
-            bent.net.control[height / 2 * width + width / 2] += size * normal;
+            Arc::make_mut(&mut bent.net).control[height / 2 * width + width / 2] += size * normal;
             bent.farthest = bent.net.farthest(&samples[quad]);
-            let patch = bent.net.clone();
+            let patch = Arc::clone(&bent.net);
             let places = (0..=200u32).flat_map(|j| (0..=200u32).map(move |i| [i, j]));
             let points = places.map(|place| place.map(|k| f64::from(k) / 200.0));
             let distance = |[u, v]: [f64; 2]| index.nearest(patch.position(u, v)).unwrap().distance;

@@ -26,6 +26,11 @@ impl Breaks {
         self.0.len() - 1
     }
 
+    /// Whether all of them are ends of `spans` equal spans, a power of two.
+    pub(crate) fn are_among(&self, spans: usize) -> bool {
+        self.0.iter().all(|t| (t * spans as f64).fract() == 0.0)
+    }
+
     /// Width of the first span.
     pub(crate) fn first_width(&self) -> f64 {
         self.0[1] - self.0[0]

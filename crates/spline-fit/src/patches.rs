@@ -22,7 +22,7 @@ use topipe_progress::{Progress, UnitKey, Units};
 pub(crate) struct Fitted {
     pub(crate) borders: [Border; 4],
     pub(crate) corners: [DVec3; 4],
-    pub(crate) net: Net,
+    pub(crate) net: Arc<Net>,
     /// The largest distance of a sample, mm.
     pub(crate) farthest: f64,
     /// Whether it was tried to draw it nearer since, see [`crate::reweighting`].
@@ -204,6 +204,7 @@ impl Patches<'_> {
                         progress.step(count, layout.quads.len() as u64, "patches");
                     }
                     let farthest = net.farthest(samples);
+                    let net = Arc::new(net);
                     Ok(Arc::new(Fitted { borders, corners, net, farthest, drawn: false, key }))
                 };
                 (quad, fitted())

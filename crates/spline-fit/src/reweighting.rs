@@ -51,7 +51,7 @@ impl Patches<'_> {
                 self.near_enough,
             );
             if let Some(nearer) = nearer(&task, &fitted.net, samples, tolerance) {
-                fitted.net = nearer;
+                fitted.net = Arc::new(nearer);
             }
             Ok(())
         })

@@ -14,7 +14,7 @@ use crate::common::{Common, same_quads};
 use crate::crossed::{self, Crossed};
 use crate::fit::{check, samples};
 use crate::hermite;
-use crate::knot_insertion::insert_knots;
+use crate::knot_insertion::{Coarse, Knots, insert_knots};
 use crate::network::{KnownFits, Network, network};
 use crate::patch_fit::Net;
 use crate::patches::{Before, Patches, Round, places};
@@ -40,7 +40,7 @@ pub(crate) struct Given<'a> {
     pub(crate) progress: &'a Progress,
 }
 
-/// A fit of curves and patches to a layout, without the knots that are inserted where normals turn fast.
+/// A fit of curves and patches to a layout.
 pub(crate) struct Fit<'a> {
     pub(crate) setting: Setting<'a>,
     /// At their foot points.
@@ -56,8 +56,7 @@ pub(crate) struct Fit<'a> {
     pub(crate) beyond: Vec<Beyond>,
     /// Where patches pass through themselves or each other; looked for where something is to be divided.
     pub(crate) crossed: Vec<Crossed>,
-    /// With knots, if they were inserted already.
-    nets: Option<Vec<Net>>,
+    knots: Knots,
 }
 
 impl<'a> Fit<'a> {
@@ -96,7 +95,7 @@ impl<'a> Fit<'a> {
         );
         // The error of the samples first, as if they had been taken first.
         let (mut samples, mut setting) = (samples?, setting?);
-        // Building the index is work for one thread.
+        // Neither keeps all threads busy all the time.
         let is_needed = parameters.refinements > 0 && before.is_none();
         let (index, ()) = rayon::join(
             || is_needed.then(|| Arc::new(SurfaceIndex::build(&layout.part.mesh))),
@@ -141,51 +140,38 @@ impl<'a> Fit<'a> {
         };
         patches.draw_nearer(&mut round.fitted, &mut samples)?;
         let Patches { starts, samples: keys, .. } = patches;
-        let (beyond, crossed, nets) = (Vec::new(), Vec::new(), None);
-        let mut fit =
-            Self { setting, samples, starts, keys, refinement, known, round, beyond, crossed, nets };
         if parameters.divisions > 0 {
-            fit.refinement.index(&fit.setting);
+            refinement.index(&setting);
         }
-        // Knots come in rounds that not all threads are busy in. After a division they can wait, as the next one may be better, unless
-        // patches are looked at that fold with them only.
-        let are_needed = before.is_none() || parameters.untangle;
-        (fit.beyond, fit.nets) = rayon::join(
-            || fit.measured(parameters, before),
-            || are_needed.then(|| fit.with_knots(parameters, progress)),
+        let known_knots = before.map(|before| (before.coarse(), &before.knots));
+        let coarse = coarse(&setting, &round);
+        // Knots come in rounds that not all threads are busy in.
+        let (beyond, knots) = rayon::join(
+            || measured(coarse, &samples, &refinement, parameters, before),
+            || insert_knots(coarse, known_knots, parameters.max_normal_jump, progress),
         );
+        let crossed = Vec::new();
+        let mut fit =
+            Self { setting, samples, starts, keys, refinement, known, round, beyond, crossed, knots };
         // Without places beyond the tolerance nothing is to be divided, and whoever does so wants to know whether it does harm.
         if parameters.divisions > 0 && (parameters.untangle || before.is_some() || !fit.beyond.is_empty()) {
-            // With knots in all fits or in none: they are compared.
-            let kept = if parameters.untangle { None } else { fit.nets.take() };
             fit.crossed = crossed::crossed(&fit, before);
-            fit.nets = fit.nets.take().or(kept);
         }
         Ok(fit)
     }
 
-    /// Where the surface is beyond the tolerance, or was before and is the same.
-    fn measured(&self, parameters: &Parameters, before: Option<&Fit<'_>>) -> Vec<Beyond> {
-        let Self { setting, samples, refinement, round: Round { network, fitted, .. }, .. } = self;
-        if parameters.divisions == 0 {
-            return Vec::new();
-        }
-        let Some(index) = refinement.known_index() else { return Vec::new() };
-        let measured = Measured { setting, network, fitted, samples, index };
-        let limit = parameters.largest_distance(&setting.layout.part.mesh);
-        match before {
-            None => measured.beyond(limit),
-            Some(before) => {
-                let same: Vec<bool> =
-                    (0..fitted.len()).map(|quad| self.has_same_patch(before, quad)).collect();
-                measured.beyond_after(&before.beyond, &same, limit)
-            }
-        }
+    pub(crate) fn coarse(&self) -> Coarse<'_> {
+        coarse(&self.setting, &self.round)
     }
 
     #[cfg(test)]
     pub(crate) fn measured_anew(&self, parameters: &Parameters) -> Vec<Beyond> {
-        self.measured(parameters, None)
+        measured(self.coarse(), &self.samples, &self.refinement, parameters, None)
+    }
+
+    #[cfg(test)]
+    pub(crate) fn knots(&self) -> &Knots {
+        &self.knots
     }
 
     #[cfg(test)]
@@ -198,9 +184,9 @@ impl<'a> Fit<'a> {
         &self.round.fitted
     }
 
-    /// Whether a patch was taken over from another fit as it was.
+    /// Whether a patch was taken over from another fit as it was, with its knots.
     pub(crate) fn has_same_patch(&self, before: &Fit<'_>, quad: usize) -> bool {
-        let patches = self.round.fitted.get(quad).zip(before.round.fitted.get(quad));
+        let patches = self.knots.nets.get(quad).zip(before.knots.nets.get(quad));
         patches.is_some_and(|(own, other)| Arc::ptr_eq(own, other))
     }
 
@@ -212,29 +198,18 @@ impl<'a> Fit<'a> {
 
     /// A box around a patch, that of its control points.
     pub(crate) fn patch_box(&self, quad: usize) -> [DVec3; 2] {
-        extent(self.net(quad).control.iter().copied())
+        extent(self.knots.nets[quad].control.iter().copied())
     }
 
-    /// A patch, with knots if they were inserted already.
-    fn net(&self, quad: usize) -> &Net {
-        self.nets.as_ref().map_or_else(|| &self.round.fitted[quad].net, |nets| &nets[quad])
-    }
-
-    fn with_knots(&self, parameters: &Parameters, progress: &Progress) -> Vec<Net> {
-        let Round { network, fitted, .. } = &self.round;
-        insert_knots(&self.setting, &network.curves, fitted, parameters.max_normal_jump, progress)
-    }
-
-    /// The part of the surface that may be in certain boxes, and the quads of its patches; without knots where they were not inserted
-    /// yet: then angles between patches are larger, and places where patches fold that follow their normals closely are not seen.
+    /// The part of the surface that may be in certain boxes, and the quads of its patches.
     pub(crate) fn surface_in(&self, boxes: &[[DVec3; 2]]) -> (SplineSurface, Vec<u32>) {
         let is_in =
             |[low, high]: [DVec3; 2]| boxes.iter().any(|[l, h]| low.cmple(*h).all() && high.cmpge(*l).all());
-        let Round { network, fitted, .. } = &self.round;
-        let quads = (0..fitted.len() as u32).into_par_iter();
+        let nets = &self.knots.nets;
+        let quads = (0..nets.len() as u32).into_par_iter();
         let quads: Vec<u32> = quads.filter(|&quad| is_in(self.patch_box(quad as usize))).collect();
-        let nets = quads.iter().map(|&quad| (quad as usize, self.net(quad as usize).clone()));
-        let mut surface = assemble(&self.setting, network, nets);
+        let nets = quads.iter().map(|&quad| (quad as usize, Net::clone(&nets[quad as usize])));
+        let mut surface = assemble(&self.setting, &self.round.network, nets);
         let edges = &surface.edges;
         surface.faces.retain(|face| {
             let sides = face.loops.iter().flatten();
@@ -243,14 +218,39 @@ impl<'a> Fit<'a> {
         (surface, quads)
     }
 
-    /// The surface, with knots.
-    pub(crate) fn surface(mut self, given: Given<'_>) -> SplineSurface {
-        let nets = self.nets.take();
-        let nets = nets.unwrap_or_else(|| self.with_knots(given.parameters, given.progress));
-        let mut surface = assemble(&self.setting, &self.round.network, nets.into_iter().enumerate());
-        simplify(&mut surface, self.setting.borders.tolerance);
+    pub(crate) fn surface(self) -> SplineSurface {
+        let Self { setting, round: Round { network, fitted, .. }, knots, .. } = self;
+        // Most patches are in both.
+        drop(fitted);
+        let nets = knots.nets.into_iter().map(Arc::unwrap_or_clone).enumerate();
+        let mut surface = assemble(&setting, &network, nets);
+        simplify(&mut surface, setting.borders.tolerance);
         surface
     }
+}
+
+fn coarse<'a>(setting: &'a Setting<'a>, round: &'a Round) -> Coarse<'a> {
+    Coarse { setting, network: &round.network, fitted: &round.fitted }
+}
+
+/// Where the surface is beyond the tolerance, or was before and is the same.
+fn measured(
+    Coarse { setting, network, fitted }: Coarse<'_>,
+    samples: &[Arc<PatchSamples>],
+    refinement: &Refinement,
+    parameters: &Parameters,
+    before: Option<&Fit<'_>>,
+) -> Vec<Beyond> {
+    let Some(index) = refinement.known_index().filter(|_| parameters.divisions > 0) else {
+        return Vec::new();
+    };
+    let measured = Measured { setting, network, fitted, samples, index };
+    let limit = parameters.largest_distance(&setting.layout.part.mesh);
+    let Some(before) = before else { return measured.beyond(limit) };
+    let others = &before.round.fitted;
+    let is_same = |(quad, own)| others.get(quad).is_some_and(|other| Arc::ptr_eq(own, other));
+    let same: Vec<bool> = fitted.iter().enumerate().map(is_same).collect();
+    measured.beyond_after(&before.beyond, &same, limit)
 }
 
 /// The keys of the patches of the first round, before any knots are inserted.
