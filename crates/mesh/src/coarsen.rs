@@ -4,6 +4,7 @@
 //! mesh is triangulated anew with only those vertices that are to stay and the edges between them that are constrained.
 //! No point of the surface moves, as everything happens inside the flat faces of the original.
 
+use crate::csr::Csr;
 use crate::refine::{HalfEdges, Refiner};
 use crate::{Connectivity, ConnectivityError, FaceId, HalfEdgeId, Provenance, VertexId};
 use glam::{DVec2, DVec3};
@@ -23,32 +24,6 @@ pub struct Coarsened {
 
 /// Faces of the original that one thread does at least: most are whole, and done in no time.
 const CHUNK: usize = 512;
-
-/// The faces that each face of the original has been cut into, in order; all in one list.
-struct Children {
-    start: Vec<u32>,
-    faces: Vec<FaceId>,
-}
-
-impl Children {
-    fn new(parent_face: &[FaceId], parents: usize) -> Self {
-        let mut start = vec![0u32; parents + 1];
-        parent_face.iter().for_each(|parent| start[parent.index() + 1] += 1);
-        (0..parents).for_each(|k| start[k + 1] += start[k]);
-        let mut next = start.clone();
-        let mut faces = vec![FaceId::NONE; parent_face.len()];
-        for (face, parent) in parent_face.iter().enumerate() {
-            let slot = &mut next[parent.index()];
-            faces[*slot as usize] = FaceId::new(face);
-            *slot += 1;
-        }
-        Self { start, faces }
-    }
-
-    fn of(&self, parent: usize) -> &[FaceId] {
-        &self.faces[self.start[parent] as usize..self.start[parent + 1] as usize]
-    }
-}
 
 /// The triangles that a face of the original is made of.
 enum Pieces {
@@ -78,7 +53,9 @@ impl Refiner {
         for v in self.part.mesh.vertices() {
             keep[v.index()] |= matches!(self.part.provenance[v.index()], Provenance::Vertex(_));
         }
-        let children = Children::new(&self.parent_face, parents);
+        // The faces that each face of the original has been cut into.
+        let cut = self.parent_face.iter().enumerate();
+        let children = Csr::new(parents, cut.map(|(face, parent)| (parent.0, FaceId::new(face))));
         let mut pieces: Vec<Option<Pieces>> = (0..parents).map(|_| None).collect();
         let mut open: Vec<usize> = (0..parents).collect();
         while !open.is_empty() {
@@ -87,13 +64,13 @@ impl Refiner {
             let found: Vec<_> = open
                 .par_iter()
                 .with_min_len(CHUNK)
-                .map(|&parent| match children.of(parent) {
+                .map(|&parent| match children.list(parent) {
                     [_] => None,
                     own => self.retriangulate(own, &keep, constrained, labels),
                 })
                 .collect();
             for (&parent, made) in open.iter().zip(found) {
-                let own = children.of(parent);
+                let own = children.list(parent);
                 pieces[parent] = Some(match made {
                     Some(triangles) => Pieces::New(triangles),
                     None => {
@@ -138,7 +115,7 @@ impl Refiner {
         let (mut parent_face, mut new_labels) = (Vec::new(), Vec::new());
         let mut features = FxHashMap::with_capacity_and_hasher(self.features.len(), Default::default());
         for parent in 0..parents {
-            let own = children.of(parent);
+            let own = children.list(parent);
             let Some(&first) = own.first() else { continue };
             let mut push = |corners: [VertexId; 3], label: u32| {
                 part.mesh.triangles.push(corners.map(|v| vertex[v.index()]));

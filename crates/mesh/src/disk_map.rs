@@ -11,6 +11,7 @@
 
 mod envelope;
 
+use crate::csr::Csr;
 use crate::{TriangleMesh, VertexId};
 use envelope::Envelope;
 use glam::{DVec2, DVec3};
@@ -69,41 +70,6 @@ pub struct DiskSystem {
 
 const FIXED: u32 = u32::MAX;
 
-/// Lists of different lengths in one vector.
-#[derive(Debug, Clone)]
-struct Csr<T> {
-    start: Vec<u32>,
-    entries: Vec<T>,
-}
-
-impl<T: Copy + Default> Csr<T> {
-    /// Puts each item on the list of its number; items of a list stay in order.
-    fn new(lists: usize, items: &[(u32, T)]) -> Self {
-        let mut start = vec![0u32; lists + 1];
-        items.iter().for_each(|item| start[item.0 as usize + 1] += 1);
-        (0..lists).for_each(|k| start[k + 1] += start[k]);
-        let mut next = start.clone();
-        let mut entries = vec![T::default(); items.len()];
-        for &(list, item) in items {
-            entries[next[list as usize] as usize] = item;
-            next[list as usize] += 1;
-        }
-        Self { start, entries }
-    }
-
-    fn len(&self) -> usize {
-        self.start.len() - 1
-    }
-
-    fn list(&self, k: usize) -> &[T] {
-        &self.entries[self.start[k] as usize..self.start[k + 1] as usize]
-    }
-
-    fn list_mut(&mut self, k: usize) -> &mut [T] {
-        &mut self.entries[self.start[k] as usize..self.start[k + 1] as usize]
-    }
-}
-
 impl DiskSystem {
     /// The equations for the vertices of `mesh` that are not `fixed`. `None` when some vertex has no path to a fixed one or the
     /// numbers overflow.
@@ -132,7 +98,7 @@ impl DiskSystem {
                 items.push((row, (corners[b].0, half / to_b.length())));
             }
         }
-        let mut weights = Csr::new(free as usize, &items);
+        let mut weights = Csr::new(free as usize, items.iter().copied());
         // Slivers without area have weights that are zero, infinite or no numbers: bounded weights stay positive, which
         // is all the theorem asks for.
         for row in 0..weights.len() {
@@ -165,7 +131,7 @@ impl DiskSystem {
         }
         matrix.factor()?;
         rows.iter_mut().filter(|row| **row != FIXED).for_each(|row| *row = place[*row as usize]);
-        let borders = Csr::new(order.len(), &border_items);
+        let borders = Csr::new(order.len(), border_items.iter().copied());
         Some(Self { triangles: mesh.triangles.clone(), rows, borders, matrix })
     }
 

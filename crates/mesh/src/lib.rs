@@ -9,6 +9,7 @@
 
 pub mod coarsen;
 mod connectivity;
+mod csr;
 mod curvature;
 pub mod disk_map;
 pub mod half_edges;

@@ -1,6 +1,6 @@
 //! Solving the equations of a disk: elimination without a subtraction, within the envelope of the matrix.
 
-use super::Csr;
+use crate::csr::Csr;
 use glam::DVec2;
 use multiversion::multiversion;
 
