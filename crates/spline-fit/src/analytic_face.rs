@@ -75,7 +75,14 @@ mod tests {
     /// A ring of revolution: outer wall, inner wall, two plane rings; all rims are two half circles.
     fn tube(axis: DVec3, center: DVec3, outer: f64, inner: f64, height: f64) -> SplineSurface {
         let (u, _) = axis.any_orthonormal_pair();
-        let mut surface = SplineSurface { vertices: vec![], edges: vec![], patches: vec![], faces: vec![] };
+        let mut surface = SplineSurface {
+            vertices: vec![],
+            edges: vec![],
+            patches: vec![],
+            faces: vec![],
+            tolerance: None,
+            tolerance_mm: None,
+        };
         let mut rim = |radius: f64, z: f64| -> [u32; 2] {
             let first = surface.vertices.len() as u32;
             let c = center + axis * z;

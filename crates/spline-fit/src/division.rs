@@ -37,7 +37,7 @@ fn improved(
     let places = places(&fit, given.parameters.untangle);
     // Not looked for either, where nothing is to be divided.
     if places.is_empty() {
-        return Ok(fit.surface());
+        return Ok(fit.surface(given.parameters));
     }
     if rounds > 0 {
         progress.remark(&format!("{}: patches there are divided", text(&fit, given)));
@@ -67,7 +67,7 @@ fn improved(
         }
     }
     progress.remark(&format!("{}: dividing brings nothing more", text(&fit, given)));
-    Ok(fit.surface())
+    Ok(fit.surface(given.parameters))
 }
 
 /// Whether a fit to a division around these vertices, one for each place, is to be taken; the trials learn from it. It is where nearly

@@ -213,6 +213,8 @@ fn solve(
             })
             .collect(),
         faces: Vec::new(),
+        tolerance: None,
+        tolerance_mm: None,
     })
 }
 

@@ -85,6 +85,11 @@ pub struct SplineSurface {
     pub patches: Vec<Patch>,
     /// Faces that are exactly plane or cylindrical.
     pub faces: Vec<AnalyticFace>,
+    /// The largest distance from the mesh that the fit was asked for, over the diagonal of the part; none where it was asked for none.
+    /// Whether it holds is measured by the validation.
+    pub tolerance: Option<f64>,
+    /// The same in mm; the narrower of both counts.
+    pub tolerance_mm: Option<f64>,
 }
 
 /// Position and first derivatives of a patch at a parameter.

@@ -218,13 +218,16 @@ impl<'a> Fit<'a> {
         (surface, quads)
     }
 
-    pub(crate) fn surface(self) -> SplineSurface {
+    pub(crate) fn surface(self, parameters: &Parameters) -> SplineSurface {
         let Self { setting, round: Round { network, fitted, .. }, knots, .. } = self;
         // Most patches are in both.
         drop(fitted);
         let nets = knots.nets.into_iter().map(Arc::unwrap_or_clone).enumerate();
         let mut surface = assemble(&setting, &network, nets);
         simplify(&mut surface, setting.borders.tolerance);
+        let asked = |tolerance: &f64| *tolerance > 0.0;
+        surface.tolerance = Some(parameters.tolerance).filter(asked);
+        surface.tolerance_mm = parameters.tolerance_mm.filter(asked);
         surface
     }
 }
@@ -303,6 +306,8 @@ fn assemble(
         edges,
         patches: nets.map(|(quad, net)| patch(layout, quad, net)).collect(),
         faces: setting.borders.faces.clone(),
+        tolerance: None,
+        tolerance_mm: None,
     }
 }
 

@@ -25,7 +25,7 @@ kinds! {
     /// A partition of a mesh into quadrilaterals.
     QuadLayout = "quad layout" v 2: topipe_quad_matching::QuadLayout;
     /// A closed surface of B-spline patches.
-    SplineSurface = "spline surface" v 2: topipe_spline_fit::SplineSurface;
+    SplineSurface = "spline surface" v 3: topipe_spline_fit::SplineSurface;
     /// A curve skeleton.
     Skeleton = "skeleton" v 3: topipe_skeleton::Skeleton;
     /// Beams between shared nodes.

@@ -171,9 +171,9 @@ pub fn validate(
     };
     progress.step(sections, sections, "sections of the report");
     let stiffness = inputs.stiffness.cloned();
-    let limits = match &surface {
-        Some(surface) => limits::check(surface, diagonal, parameters)?,
-        None => Vec::new(),
+    let limits = match (&surface, inputs.surface) {
+        (Some(figures), Some(fitted)) => limits::check(figures, fitted, diagonal, parameters)?,
+        _ => Vec::new(),
     };
     Ok(Report { original: original_figures, smoothing, layout, surface, skeleton, stiffness, limits })
 }

@@ -2,17 +2,24 @@
 
 use crate::report::{LimitFigures, SurfaceFigures};
 use crate::{Parameters, ValidationError};
+use topipe_spline_fit::SplineSurface;
 
-/// Compares the surface with the limits that are set. Fails with `require` where one is broken.
+/// Compares the surface with the limits that are set, its distance from the mesh with what it was `fitted` to where none is set for it.
+/// Fails with `require` where one is broken.
 pub(crate) fn check(
     surface: &SurfaceFigures,
+    fitted: &SplineSurface,
     diagonal: f64,
     parameters: &Parameters,
 ) -> Result<Vec<LimitFigures>, ValidationError> {
-    let asked = [parameters.max_deviation_mm, parameters.max_deviation.map(|share| share * diagonal)];
-    let mut limits = Vec::new();
     // The narrower of both.
-    let narrower = asked.into_iter().flatten().min_by(f64::total_cmp);
+    let narrower = |mm: Option<f64>, share: Option<f64>| {
+        let both = [mm, share.map(|share| share * diagonal)];
+        both.into_iter().flatten().filter(|limit| *limit >= 0.0).min_by(f64::total_cmp)
+    };
+    let narrower = narrower(parameters.max_deviation_mm, parameters.max_deviation)
+        .or_else(|| narrower(fitted.tolerance_mm, fitted.tolerance));
+    let mut limits = Vec::new();
     if let (Some(limit), Some(deviation)) = (narrower, &surface.deviation) {
         limits.push(LimitFigures {
             figure: "surface.deviation.max_mm".into(),

@@ -12,7 +12,7 @@ pub struct Parameters {
     /// middles of equal parts of the edge's parameter range, so corners, where a normal may not exist, are left out.
     pub points_per_edge: u32,
     /// Largest two-sided distance of the surface from the mesh it was fitted to, mm. Where it is more the report says
-    /// so and where.
+    /// so and where. Without this and the next the tolerance that the fit was asked for.
     pub max_deviation_mm: Option<f64>,
     /// The same over the diagonal of the part; the narrower of both counts.
     pub max_deviation: Option<f64>,

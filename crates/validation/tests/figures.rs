@@ -120,7 +120,14 @@ fn spline_cube(degree: usize, spans: usize) -> SplineSurface {
         }
         patches.push(Patch { sides, basis_u: basis.clone(), basis_v: basis.clone(), control });
     }
-    SplineSurface { vertices: (0..8).map(cube_corner).collect(), edges, patches, faces: Vec::new() }
+    SplineSurface {
+        vertices: (0..8).map(cube_corner).collect(),
+        edges,
+        patches,
+        faces: Vec::new(),
+        tolerance: None,
+        tolerance_mm: None,
+    }
 }
 
 #[test]
@@ -344,6 +351,23 @@ fn limits_are_marked_and_only_required_ones_are_errors() {
                 assert!(error.to_string().contains("at (0.500, 0.500, 1.225)"), "{error}");
             }
         }
+    }
+    // Without a limit of its own the one that the fit was asked for counts.
+    let diagonal = 3f64.sqrt();
+    for (share, mm, own, limit, kept) in [
+        (None, Some(0.2), None, 0.2, false),
+        (Some(0.2), Some(0.3), None, 0.3, true),
+        (Some(0.1), Some(0.3), None, 0.1 * diagonal, false),
+        (None, Some(0.2), Some(0.3), 0.3, true),
+    ] {
+        let surface = SplineSurface { tolerance: share, tolerance_mm: mm, ..surface.clone() };
+        let inputs = Inputs { surface: Some(&surface), ..inputs };
+        let parameters = Parameters { max_deviation_mm: own, ..Default::default() };
+        let report = validate(&inputs, &parameters, &Progress::silent()).unwrap();
+        assert_eq!(report.limits[0].kept, kept);
+        close(report.limits[0].limit, limit, 1e-12);
+        let required = Parameters { require: true, ..parameters };
+        assert_eq!(validate(&inputs, &required, &Progress::silent()).is_ok(), kept);
     }
     let negative = with(Parameters { max_normal_jump: Some(-1.0), ..Default::default() });
     assert!(negative.unwrap_err().to_string().contains("max_normal_jump = -1"));

@@ -36,6 +36,8 @@ fn tube() -> SplineSurface {
             AnalyticFace { shape: plane(0.0, -DVec3::Z), loops: vec![rim(0, true), rim(2, false)] },
             AnalyticFace { shape: plane(HEIGHT, DVec3::Z), loops: vec![rim(1, false), rim(3, true)] },
         ],
+        tolerance: None,
+        tolerance_mm: None,
     }
 }
 

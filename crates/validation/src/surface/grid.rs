@@ -236,6 +236,8 @@ mod tests {
             edges: Vec::new(),
             patches: vec![patch],
             faces: Vec::new(),
+            tolerance: None,
+            tolerance_mm: None,
         };
         let sampled = sample(&surface, 0.5);
         let mut chords = 0.0f64;
@@ -274,6 +276,8 @@ mod tests {
             edges: Vec::new(),
             patches: vec![patch],
             faces: Vec::new(),
+            tolerance: None,
+            tolerance_mm: None,
         };
         let sampled = sample(&surface, 0.5);
         let (u, v) = (0.36, 0.62);
