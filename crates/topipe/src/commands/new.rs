@@ -10,9 +10,6 @@ use topipe_mesh::import::ImportOptions;
 use topipe_mesh::{Connectivity, Part, RegionShape};
 use topipe_progress::{Progress, number};
 
-/// The surfaces of meshes up to so many triangles are untangled unless the user takes it out. The bracket of 14,698 triangles takes 2.7 s
-/// for 2.1 s, divided and roughened to 30,000 and 100,000 triangles 5 s for 3 s and 13 s for 6 s (stages without exports).
-const UNTANGLED: usize = 100_000;
 /// Meshes up to so many triangles are smoothed once to see what is in them: about a second.
 const LOOKED_AT: usize = 150_000;
 /// A part that fills less of its bounding box is taken as made of beams. The parts of the fixtures that are fill 5 to 9 %,
@@ -256,11 +253,6 @@ fn pipeline(name: &str, path: &str, output: &Path, looked: &Looked) -> String {
     } else {
         ("", "", String::new(), NO_FRAME)
     };
-    let untangle = if looked.triangles <= UNTANGLED {
-        "untangle = true                     # divides patches that pass through each other; without it the fit is faster"
-    } else {
-        "# untangle = true                   # divides patches that pass through each other; takes minutes on this mesh"
-    };
     let _ = write!(
         text,
         r#"#
@@ -295,7 +287,7 @@ input = "tiles"
 [stage.surface]
 kind = "spline-fit"
 input = "quads"
-{untangle}
+untangle = true                     # divides patches that pass through each other; without it the fit is faster
 # tolerance = 1e-3                  # 0.1 % of the diagonal: nearer to the mesh, more patches
 {frame}{about}
 [stage.check]                       # measures all of it: report.json, report.html
