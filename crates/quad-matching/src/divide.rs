@@ -48,6 +48,17 @@ pub fn divide(
     wanted: &[Vec<u32>],
     progress: &Progress,
 ) -> Result<Option<Division>, QuadMatchingError> {
+    divide_in(layout, &Refiner::new(&layout.part)?, wanted, progress)
+}
+
+/// The same in a copy of a refiner that has made the part of the layout: provenance in the finer layout refers to the part that
+/// was refined.
+pub(crate) fn divide_in(
+    layout: &QuadLayout,
+    refiner: &Refiner,
+    wanted: &[Vec<u32>],
+    progress: &Progress,
+) -> Result<Option<Division>, QuadMatchingError> {
     let around = around(layout, wanted);
     let mut rejected: FxHashSet<u32> = FxHashSet::default();
     for _ in 0..ATTEMPTS {
@@ -56,7 +67,7 @@ pub fn divide(
         if stars.is_empty() {
             break;
         }
-        match divided(layout, &stars, progress)? {
+        match divided(layout, refiner.clone(), &stars, progress)? {
             Ok(layout) => return Ok(Some(Division { layout, vertices })),
             Err(outside) => rejected.extend(outside),
         }
@@ -130,12 +141,13 @@ fn sides_at(layout: &QuadLayout, quad: usize, k: usize) -> [Side; 2] {
 /// The layout with the stars divided, or the vertices of those that leave a corner of the new quads outside the gates.
 fn divided(
     layout: &QuadLayout,
+    refiner: Refiner,
     stars: &[Star<'_>],
     progress: &Progress,
 ) -> Result<Result<QuadLayout, Vec<u32>>, QuadMatchingError> {
     let snap = Parameters::default().snap;
     let corners = || stars.iter().flat_map(|star| star.quads).copied();
-    let mut tiled = Tiled::over(Refiner::new(&layout.part)?, layout.quad_of_face.clone());
+    let mut tiled = Tiled::over(refiner, layout.quad_of_face.clone());
     let mut vertices = layout.vertices.clone();
     let mut edges = layout.edges.clone();
     let halves = halve(layout, corners(), &mut tiled, &mut vertices, &mut edges, snap);

@@ -1,8 +1,11 @@
 //! The layout of bordered tiles by midpoint subdivision.
 //!
 //! Each tile of n sides becomes n quads: its centre is joined to the middles of its sides. That needs no matching and no
-//! even count, works with borders, and leaves corners of 360 / n degrees at centres and about 90 at middles.
+//! even count, works with borders, and leaves corners of 360 / n degrees at centres and about 90 at middles. Vertices are relaxed
+//! afterwards; quads with a corner that is too wide still are divided, see [`crate::divide()`].
 
+use crate::cost::GATES;
+use crate::divide::{Division, divide_in};
 use crate::ends::turn_ends;
 use crate::outlines::outlines;
 use crate::refine::{Quads, Regions, refine};
@@ -54,11 +57,13 @@ pub(crate) fn subdivide(
     if turned > 0 {
         progress.remark(&format!("ends of edges turned {turned} times beside corners outside the gates"));
     }
+    let wide = opposite_wide_corners(&fine);
     let Regions { tiled, vertices, edges, .. } = fine;
     let quad_of_face = tiled.tile_of_face;
     let region_faces = faces.into_iter().map(halved).collect();
+    let refiner = (!wide.is_empty()).then(|| tiled.refiner.clone());
     let (part, _) = tiled.refiner.finish();
-    let layout = QuadLayout {
+    let mut layout = QuadLayout {
         part,
         vertices,
         edges,
@@ -68,8 +73,30 @@ pub(crate) fn subdivide(
         tiles: tiling.tile_count() as u32,
         macro_triangles: 0,
     };
+    if let Some(refiner) = refiner
+        && let Some(Division { layout: finer, vertices }) = divide_in(&layout, &refiner, &wide, progress)?
+    {
+        let shared = vertices.iter().flatten().count();
+        progress
+            .remark(&format!("{shared} of {} corners wider than 165 degrees are shared by two", wide.len()));
+        layout = finer;
+    }
     layout.check_corners(parameters)?;
     Ok(layout)
+}
+
+/// For each corner beyond the upper gate the vertex opposite: divided around that, two quads share the corner.
+fn opposite_wide_corners(regions: &Regions) -> Vec<Vec<u32>> {
+    let start = |side: Side| regions.edges[side.edge as usize].ends[side.reversed as usize];
+    let of_region = |(r, sides): (usize, &Vec<Side>)| {
+        let is_wide = |&k: &usize| {
+            let vertex = regions.vertices[start(sides[k]) as usize];
+            regions.tiled.corner_angle(vertex, r as u32) > GATES[1]
+        };
+        let wide: Vec<usize> = (0..sides.len()).filter(is_wide).collect();
+        wide.into_iter().map(|k| vec![start(sides[(k + 2) % sides.len()])]).collect::<Vec<_>>()
+    };
+    regions.sides.iter().enumerate().flat_map(of_region).collect()
 }
 
 /// A region face whose sides are the halves of what they were.

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use topipe_mesh::import::{ImportOptions, Source, read_source};
-use topipe_mesh::{DVec3, FaceId, Part, Region, RegionId, RegionShape, TriangleMesh, VertexId};
+use topipe_mesh::{DVec3, FaceId, Part, Provenance, Region, RegionId, RegionShape, TriangleMesh, VertexId};
 use topipe_progress::Progress;
 use topipe_quad_matching::{Pairing, Parameters, QuadLayout, QuadMatchingError, match_quads, verify};
 use topipe_smoothing::smooth;
@@ -43,6 +43,28 @@ fn laid_out(tiling: &Tiling) -> QuadLayout {
 fn irregular(layout: &QuadLayout) -> usize {
     let regular = |a: &f64| (15.0..=165.0).contains(&a.to_degrees());
     layout.corner_angles().iter().filter(|corners| !corners.iter().all(regular)).count()
+}
+
+/// With large tiles the bracket has a corner of 187 degrees at a fold of its mesh, wherever its vertex is moved to.
+#[test]
+fn two_quads_share_a_corner_that_is_too_wide_for_one() {
+    let parameters = topipe_tiling::Parameters { tile_size: 7.0, ..tiling_parameters() };
+    let tiling = tiled(&smoothed("bracket"), &parameters);
+    let layout = laid_out(&tiling);
+    assert_eq!(irregular(&layout), 0);
+    // Divided or not, vertices say where in the mesh of the tiling they lie.
+    let (before, after) = (&tiling.part.mesh, &layout.part.mesh);
+    for (v, source) in after.vertices().zip(&layout.part.provenance) {
+        let expected = match *source {
+            Provenance::Vertex(v) => before.position(v),
+            Provenance::Edge { ends: [a, b], t } => before.position(a).lerp(before.position(b), t),
+            Provenance::Face { face, weights: [u, v] } => {
+                let [a, b, c] = before.corners(face);
+                a * (1.0 - u - v) + b * u + c * v
+            }
+        };
+        assert!(after.position(v).distance(expected) < 1e-9 * before.diagonal(), "{v:?}");
+    }
 }
 
 #[test]
