@@ -105,7 +105,7 @@ fn a_run_that_breaks_a_required_limit_has_a_report_with_the_figure() {
         "Stage check failed: ",
         "measured for this page, on the results there are",
         "Volume of the CAD solid",
-        "Limit that was set",
+        "Figure with a limit",
         "at most 1.00e-9",
     ] {
         assert!(page.contains(part), "no {part}");

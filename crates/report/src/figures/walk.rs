@@ -126,7 +126,7 @@ impl Walk<'_> {
         }
     }
 
-    /// The limits that were set in the pipeline: each names its figure.
+    /// The limits that were set in the pipeline or come from the tolerance of the fit: each names its figure.
     pub(super) fn limits(&mut self, items: &[Value]) {
         for item in items {
             let path = item["figure"].as_str().unwrap_or_default();
@@ -140,7 +140,7 @@ impl Walk<'_> {
             self.findings.push(Finding {
                 path: path.to_owned(),
                 words: known.map_or_else(|| humanized(name), |known| known.words.to_owned()),
-                short: "Limit that was set".into(),
+                short: "Figure with a limit".into(),
                 value: with_unit(&item["value"], unit),
                 limit: item.get("limit").map(|limit| format!("at most {}", with_unit(limit, unit))),
                 state,
