@@ -105,3 +105,22 @@ fn what_a_stage_said_can_be_read_again() {
     let again = shop.topipe(&["run", "box.toml", "-v"]).stderr;
     assert!(again.contains(remark), "no `{remark}` in\n{again}");
 }
+
+/// A mesh with faces that are turned the other way.
+#[test]
+fn a_repaired_mesh_is_warned_of_unless_the_run_is_quiet() {
+    let shop = Workshop::new();
+    let fin = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/zoo/mixed-orientation.off");
+    std::fs::copy(fin, shop.path("box.off")).unwrap();
+    let warning = "warning: mesh: box.off was repaired: turned faces to agree with their neighbours: ";
+    let until = |more: &[&str]| {
+        let arguments = [&["run", "box.toml", "--until", "mesh"], more].concat();
+        shop.topipe(&arguments).stderr
+    };
+    assert!(until(&[]).starts_with(warning), "{}", until(&[]));
+    // From the cache as well.
+    assert!(until(&[]).starts_with(warning));
+    assert_eq!(until(&["--quiet"]), "");
+    let log = shop.topipe(&["log", "box.toml", "mesh"]).stdout;
+    assert!(log.contains("mesh: warning: box.off was repaired: "), "{log}");
+}

@@ -47,7 +47,9 @@ fn the_run_follows_the_plan() {
     let shown = shop.topipe(&["plan", "box.toml"]).stdout;
     assert!(shown.contains("lambda: 0.6307 -> 0.5"), "{shown}");
     let events = shop.events(&[]);
-    assert_eq!(events[1..4], ["stage-cached mesh", "stage-started smooth", "stage-finished smooth"]);
+    // 0.5 breaks Taubin's rule.
+    let smooth = ["stage-started smooth", "stage-warning smooth", "stage-finished smooth"];
+    assert_eq!((events[1].as_str(), &events[2..5]), ("stage-cached mesh", &smooth.map(String::from)[..]));
 }
 
 #[test]

@@ -32,6 +32,8 @@ pub enum Event {
         artifact: ContentHash,
         /// What it remarked when it was computed.
         remarks: Vec<String>,
+        /// What it warned of then.
+        warnings: Vec<String>,
     },
     /// Another process computes the same thing; we wait for it.
     StageWaiting {
@@ -62,6 +64,13 @@ pub enum Event {
     },
     /// A stage says something worth keeping.
     StageRemark {
+        /// The stage.
+        stage: String,
+        /// What it says.
+        text: String,
+    },
+    /// A stage says what its result lacks, or what it changed in its input: for the user to see.
+    StageWarning {
         /// The stage.
         stage: String,
         /// What it says.

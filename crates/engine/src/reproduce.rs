@@ -43,6 +43,7 @@ pub fn lock(record: &RunRecord, spec: &Path) -> RunRecord {
         stage.reasons.clear();
         stage.seconds = None;
         stage.remarks.clear();
+        stage.warnings.clear();
         stage.peak_memory_bytes = None;
         stage.units = None;
     }

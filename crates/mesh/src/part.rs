@@ -151,6 +151,21 @@ pub struct Repair {
     pub count: u64,
 }
 
+impl Repair {
+    /// Polygons cut into triangles.
+    pub(crate) const TRIANGULATED: &str = "triangles added for faces with more than three corners";
+    /// Points written more than once.
+    pub(crate) const WELDED: &str = "welded vertices with equal coordinates";
+    /// Points that nothing uses.
+    pub(crate) const UNUSED: &str = "dropped vertices without faces";
+
+    /// Whether it was a defect of the surface that was mended. False where a file only says in another way what a triangle mesh says:
+    /// polygons, points written twice, points that nothing uses.
+    pub fn is_of_the_surface(&self) -> bool {
+        ![Self::TRIANGULATED, Self::WELDED, Self::UNUSED].contains(&self.what.as_str())
+    }
+}
+
 /// How a mesh came into the pipeline.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ImportRecord {

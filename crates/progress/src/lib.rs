@@ -32,6 +32,11 @@ pub trait Listener: Send + Sync {
     fn step(&self, done: u64, total: u64, what: &str);
     /// A remark worth keeping in the log of the run.
     fn remark(&self, text: &str);
+    /// What the user should know without asking: the result is not all that was asked for, or the input was changed. A remark
+    /// where nobody takes warnings apart.
+    fn warning(&self, text: &str) {
+        self.remark(text);
+    }
     /// True once the computation should stop as soon as it can.
     fn interrupted(&self) -> bool;
 }
@@ -82,6 +87,14 @@ impl Progress {
     pub fn remark(&self, text: &str) {
         if let Some(listener) = &self.listener {
             listener.remark(text);
+        }
+    }
+
+    /// Tells the user what the result lacks, or what was changed in the input: shown unless the run is quiet, and kept in its log.
+    /// Each warning says what is wrong, where, and what to do.
+    pub fn warn(&self, text: &str) {
+        if let Some(listener) = &self.listener {
+            listener.warning(text);
         }
     }
 

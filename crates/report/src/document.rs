@@ -89,6 +89,8 @@ pub struct Stage {
     pub bytes: Option<u64>,
     /// Why it ran.
     pub reasons: Vec<String>,
+    /// What it warned of.
+    pub warnings: Vec<String>,
     /// What it remarked.
     pub remarks: Vec<String>,
     /// Finished parts that were found, and those that were computed.

@@ -86,7 +86,7 @@ fn smooth_as_numbered(
     let mesh = &part.mesh;
     let connectivity = Connectivity::build(mesh)?;
     if parameters.method == Method::Taubin && !parameters.obeys_taubin_rule() {
-        progress.remark(&format!(
+        progress.warn(&format!(
             "lambda = {} and mu = {} break Taubin's rule 0.01 < 1/lambda + 1/mu < 0.1: the part will {}",
             parameters.lambda,
             parameters.mu,

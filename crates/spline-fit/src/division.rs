@@ -66,7 +66,14 @@ fn improved(
             }
         }
     }
-    progress.remark(&format!("{}: dividing brings nothing more", text(&fit, given)));
+    let what = text(&fit, given);
+    if fit.beyond.is_empty() {
+        progress.remark(&format!("{what}: dividing brings nothing more"));
+    } else {
+        progress.warn(&format!(
+            "{what}: dividing patches brings nothing more; smaller tiles (`tile_size`), a finer mesh or a wider `tolerance` may"
+        ));
+    }
     Ok(fit.surface(given.parameters))
 }
 

@@ -168,10 +168,16 @@ impl EventSink for Console {
                     &format!("{stage}: waiting for {holder}, which computes the same"),
                 );
             }
-            Event::StageCached { stage, remarks, .. } => {
+            Event::StageCached { stage, remarks, warnings, .. } => {
+                for text in warnings {
+                    self.line(Verbosity::Normal, &format!("warning: {stage}: {text}"));
+                }
                 for text in remarks {
                     self.line(Verbosity::Verbose, &format!("{stage}: {text}"));
                 }
+            }
+            Event::StageWarning { stage, text } => {
+                self.line(Verbosity::Normal, &format!("warning: {stage}: {text}"));
             }
             Event::StageRemark { stage, text } => self.line(Verbosity::Verbose, &format!("{stage}: {text}")),
             Event::StageUnits { stage, reused, computed } => {

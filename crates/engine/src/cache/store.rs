@@ -78,6 +78,9 @@ pub struct KeyRecord {
     pub seconds: f64,
     /// What the stage remarked.
     pub remarks: Vec<String>,
+    /// What it warned of. Records of before have none.
+    #[serde(default)]
+    pub warnings: Vec<String>,
 }
 
 /// An artifact that was just stored.

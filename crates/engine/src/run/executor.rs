@@ -273,6 +273,7 @@ impl<'a> Executor<'a> {
             key: record.key,
             artifact: record.artifact,
             remarks: record.remarks.clone(),
+            warnings: record.warnings.clone(),
         });
         let mut slot = lock(&self.slots[stage]);
         slot.outcome = Some(Outcome::Cached);
@@ -391,6 +392,7 @@ impl<'a> Executor<'a> {
             artifact_kind: node.stage.output().name.to_owned(),
             bytes: record.as_ref().map(|record| record.bytes),
             seconds: record.as_ref().map(|record| record.seconds),
+            warnings: record.as_ref().map(|record| record.warnings.clone()).unwrap_or_default(),
             remarks: record.map(|record| record.remarks).unwrap_or_default(),
             peak_memory_bytes: slot.peak_memory,
             units: slot.units,

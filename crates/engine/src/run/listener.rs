@@ -14,6 +14,7 @@ pub(super) struct StageListener {
     events: Arc<Events>,
     last_step: Mutex<Option<Instant>>,
     remarks: Mutex<Vec<String>>,
+    warnings: Mutex<Vec<String>>,
 }
 
 /// People see no more than about ten changes a second.
@@ -22,12 +23,24 @@ const EVERY: Duration = Duration::from_millis(100);
 impl StageListener {
     pub(super) fn new(stage: &str, interrupt: Interrupt, events: Arc<Events>) -> Self {
         let stage = stage.to_owned();
-        Self { stage, interrupt, events, last_step: Mutex::new(None), remarks: Mutex::new(Vec::new()) }
+        Self {
+            stage,
+            interrupt,
+            events,
+            last_step: Mutex::default(),
+            remarks: Mutex::default(),
+            warnings: Mutex::default(),
+        }
     }
 
     /// What the stage remarked so far.
     pub(super) fn remarks(&self) -> Vec<String> {
         self.remarks.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// What it warned of so far.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
@@ -51,6 +64,11 @@ impl Listener for StageListener {
     fn remark(&self, text: &str) {
         self.remarks.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
         self.events.emit(&Event::StageRemark { stage: self.stage.clone(), text: text.to_owned() });
+    }
+
+    fn warning(&self, text: &str) {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
+        self.events.emit(&Event::StageWarning { stage: self.stage.clone(), text: text.to_owned() });
     }
 
     fn interrupted(&self) -> bool {

@@ -97,6 +97,7 @@ impl Executor<'_> {
             bytes: stored.bytes,
             seconds,
             remarks: listener.remarks(),
+            warnings: listener.warnings(),
         };
         let before = self.with_damages(|damages| self.cache().key_record(key, damages))?;
         if before.is_some_and(|before| before.artifact != record.artifact) {

@@ -120,6 +120,9 @@ pub struct StageRecord {
     pub seconds: Option<f64>,
     /// What it remarked when it was computed.
     pub remarks: Vec<String>,
+    /// What it warned of then. Records of before have none.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// The most memory the process had held by the time it was done, with whatever ran beside it.
     pub peak_memory_bytes: Option<u64>,
     /// Where the stage keeps finished parts: how many this run found and how many it computed.

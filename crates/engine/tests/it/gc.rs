@@ -179,3 +179,23 @@ fn a_cached_stage_tells_again_what_it_said() {
     assert_eq!(said[1], ("soft".to_owned(), appending));
     assert_eq!(said[3], ("size".to_owned(), Vec::new()));
 }
+
+#[test]
+fn a_warning_is_told_when_it_is_given_and_again_from_the_cache() {
+    let shop = Workshop::new(CHAIN);
+    let sets = ["soft.times=0"];
+    let first = shop.log_with(&sets);
+    let at = first.iter().position(|line| line == "soft warns: nothing is appended").unwrap();
+    assert_eq!(first[at - 1], "soft remarks: appending");
+    let (record, again) = shop.run_with(&sets, &shop.options);
+    assert!(again.contains(&"soft cached, warns: nothing is appended".to_owned()), "{again:?}");
+    assert_eq!(record.stages[1].warnings, ["nothing is appended"]);
+    assert_eq!(record.stages[1].remarks, ["appending"]);
+    assert!(record.stages[2].warnings.is_empty());
+    // Nothing of it is part of the result.
+    assert!(
+        topipe_engine::reproduce::lock(&record, std::path::Path::new("in.toml")).stages[1]
+            .warnings
+            .is_empty()
+    );
+}

@@ -121,6 +121,9 @@ impl Stage for Append {
     }
     fn run(&self, context: &StageContext<'_>, parameters: &AppendParameters) -> Result<String, StageError> {
         context.progress().remark("appending");
+        if parameters.times == 0 {
+            context.progress().warn("nothing is appended");
+        }
         let text = context.input::<Text>("input")?.to_string()
             + &parameters.suffix.repeat(parameters.times as usize);
         Ok(match parameters.style {
@@ -461,6 +464,9 @@ impl Workshop {
 pub(crate) fn line(event: &Event) -> String {
     match event {
         Event::RunStarted { pipeline, stages, .. } => format!("run {pipeline}: {}", stages.join(" ")),
+        Event::StageCached { stage, warnings, .. } if !warnings.is_empty() => {
+            format!("{stage} cached, warns: {}", warnings.join("; "))
+        }
         Event::StageCached { stage, .. } => format!("{stage} cached"),
         Event::StageWaiting { stage, .. } => format!("{stage} waits"),
         Event::StageStarted { stage, reasons, .. } => {
@@ -468,6 +474,7 @@ pub(crate) fn line(event: &Event) -> String {
             format!("{stage} starts: {}", reasons.join("; "))
         }
         Event::StageProgress { stage, .. } => format!("{stage} progresses"),
+        Event::StageWarning { stage, text } => format!("{stage} warns: {text}"),
         Event::StageRemark { stage, text } => format!("{stage} remarks: {text}"),
         Event::StageUnits { stage, reused, computed } => {
             format!("{stage} units: {reused} reused, {computed} computed")

@@ -74,7 +74,7 @@ pub(super) fn weld(soup: Soup, tolerance: f64) -> Draft {
     let equal = Welded::equal(&positions);
     if !unindexed {
         // In an STL every corner brings its own point: only for other formats are equal points a defect.
-        draft.note("welded vertices with equal coordinates", positions.len() - equal.first.len());
+        draft.note(Repair::WELDED, positions.len() - equal.first.len());
     }
     drop(positions);
     let mut vertex_of = equal.of;
@@ -99,7 +99,7 @@ pub(super) fn weld(soup: Soup, tolerance: f64) -> Draft {
     }
     let unused = draft.drop_unused_vertices();
     if !unindexed && tolerance == 0.0 {
-        draft.note("dropped vertices without faces", unused);
+        draft.note(Repair::UNUSED, unused);
     }
     draft
 }

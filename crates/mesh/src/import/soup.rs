@@ -60,7 +60,7 @@ impl Soup {
         }
         soup.note("dropped faces with fewer than three corners", too_few);
         let more = soup.triangles.len() + too_few - soup.face_count;
-        soup.note("triangles added for faces with more than three corners", more);
+        soup.note(Repair::TRIANGULATED, more);
         Ok(soup)
     }
 

@@ -105,10 +105,16 @@ pub fn missing(report: &Value) -> Vec<&'static str> {
     named.filter(|(key, ..)| report.get(key).is_none_or(Value::is_null)).map(|(_, title, _)| *title).collect()
 }
 
-/// The figures that are out of their limits.
+/// The figures that are out of their limits, each once: the limit that a pipeline sets may be the usual one.
 pub fn broken(report: &Value) -> Vec<Finding> {
-    let all = sections(report).into_iter().flat_map(|section| section.findings);
-    all.filter(|finding| finding.state == State::Broken).collect()
+    let mut broken: Vec<Finding> = Vec::new();
+    for finding in sections(report).into_iter().flat_map(|section| section.findings) {
+        let same = |known: &Finding| (&known.words, &known.limit) == (&finding.words, &finding.limit);
+        if finding.state == State::Broken && !broken.iter().any(same) {
+            broken.push(finding);
+        }
+    }
+    broken
 }
 
 #[cfg(test)]
@@ -187,6 +193,14 @@ mod tests {
         assert_eq!((findings[0].state, findings[1].state), (State::Kept, State::Broken));
         assert_eq!((findings[1].value.as_str(), findings[1].at), ("0.7500 mm", Some([1.0, 2.0, 3.0])));
         assert_eq!(findings[1].limit.as_deref(), Some("at most 0.5000 mm"));
+    }
+
+    #[test]
+    fn a_figure_beyond_a_limit_that_is_set_twice_is_named_once() {
+        let limit = |limit: f64| json!({"figure": "surface.deviation.max_mm", "value": 0.75, "limit": limit, "kept": false});
+        let report = json!({"limits": [limit(0.5), limit(0.5), limit(0.25)]});
+        let limits: Vec<_> = broken(&report).into_iter().filter_map(|finding| finding.limit).collect();
+        assert_eq!(limits, ["at most 0.5000 mm", "at most 0.2500 mm"]);
     }
 
     #[test]

@@ -58,6 +58,11 @@ pub(super) fn stages(document: &Document) -> Markup {
                 "Time is that of the computation, also for results from the cache. Memory is the most the whole process had \
                  held when the stage was done."
             }
+            @for stage in document.stages.iter().filter(|s| !s.warnings.is_empty()) {
+                ul.warnings {
+                    @for warning in &stage.warnings { li { strong { (stage.name) ": " } (warning) } }
+                }
+            }
             @for stage in document.stages.iter().filter(|s| !s.remarks.is_empty() || s.parts.is_some()) {
                 details.remarks {
                     summary { (stage.name) ": " (stage.remarks.len()) @if stage.remarks.len() == 1 { " remark" } @else { " remarks" } }

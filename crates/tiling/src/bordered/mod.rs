@@ -21,6 +21,7 @@ mod polygons;
 mod recheck;
 mod regions;
 mod repair;
+mod shortcomings;
 mod sites;
 mod sizes;
 mod strips;
@@ -65,6 +66,18 @@ const TRIES: usize = 6;
 /// Tiles a closed part that has been checked. A number of tiles that is asked for is aimed at by tessellations with other sizes:
 /// features, bends and topology add tiles, and how many they add is known afterwards only.
 pub(crate) fn tile(
+    part: &Part,
+    parameters: &Parameters,
+    progress: &Progress,
+    sizes: Option<&[f64]>,
+) -> Result<Tiling, TilingError> {
+    let tiling = tile_to_count(part, parameters, progress, sizes)?;
+    shortcomings::warn(part, parameters, &tiling, progress);
+    Ok(tiling)
+}
+
+/// As [`tile`], without a word on what is lacking.
+fn tile_to_count(
     part: &Part,
     parameters: &Parameters,
     progress: &Progress,

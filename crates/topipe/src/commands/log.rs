@@ -25,6 +25,9 @@ pub(crate) fn run(arguments: &LogArguments) -> Result<ExitCode, Failure> {
             continue;
         };
         let _ = writeln!(text, "{}: computed in {}", stage.stage, display::duration(record.seconds));
+        for warning in record.warnings {
+            let _ = writeln!(text, "{}: warning: {warning}", stage.stage);
+        }
         for remark in record.remarks {
             let _ = writeln!(text, "{}: {remark}", stage.stage);
         }

@@ -92,6 +92,7 @@ impl Ahead {
             bytes: None,
             seconds: None,
             remarks: Vec::new(),
+            warnings: Vec::new(),
             peak_memory_bytes: None,
             units: None,
         });

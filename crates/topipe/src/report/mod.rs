@@ -279,6 +279,7 @@ fn stage(record: &StageRecord, registry: &Registry) -> Stage {
         peak_memory_bytes: record.peak_memory_bytes,
         bytes: record.bytes,
         reasons: record.reasons.iter().map(ToString::to_string).collect(),
+        warnings: record.warnings.clone(),
         remarks: record.remarks.clone(),
         parts: record.units.as_ref().map(|units| (units.reused, units.computed)),
         inputs: record.inputs.iter().map(|(port, input)| (port.clone(), input.stage.clone())).collect(),

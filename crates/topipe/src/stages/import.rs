@@ -60,7 +60,14 @@ impl Stage for Import {
             ImportError::Option { .. } => StageError::BadParameter(error.to_string()),
             error => StageError::Refused(error.to_string()),
         })?;
-        for repair in &part.import.repairs {
+        let (mended, reread): (Vec<_>, Vec<_>) =
+            part.import.repairs.iter().partition(|repair| repair.is_of_the_surface());
+        if !mended.is_empty() {
+            let mended: Vec<String> =
+                mended.iter().map(|repair| format!("{}: {}", repair.what, repair.count)).collect();
+            context.progress().warn(&format!("{} was repaired: {}", mesh.name, mended.join("; ")));
+        }
+        for repair in reread {
             context.progress().remark(&format!("{}: {}", repair.what, repair.count));
         }
         Ok(part)
