@@ -46,9 +46,9 @@ pub use cylinder_fit::{CylinderFit, fit_cylinder};
 pub use error::ValidationError;
 pub use parameters::Parameters;
 pub use report::{
-    DeviationFigures, DihedralFigures, FeatureFigures, FlatFace, Hole, KinkFigures, LayoutFigures,
-    NormalJump, OriginalFigures, RepairFigures, Report, RoundFace, ShapeFigures, SkeletonFigures,
-    SmoothingFigures, SurfaceFigures,
+    CurvatureFigures, DeviationFigures, DihedralFigures, FeatureFigures, FlatFace, Hole, KinkFigures,
+    LayoutFigures, NormalJump, OriginalFigures, RepairFigures, Report, RoundFace, ShapeFigures,
+    SkeletonFigures, SmoothingFigures, SurfaceFigures,
 };
 pub use skeleton::{BranchPoint, bounding_sphere, off_center, off_center_of_points};
 pub use summary::stiffness_summary;

@@ -243,6 +243,24 @@ pub struct NormalJump {
     pub max_at: [f64; 3],
 }
 
+/// Absolute mean curvature of the patches and of the free surface of the mesh, each over its area: a fit that oscillates has more than the
+/// mesh.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CurvatureFigures {
+    /// Root mean square on the patches, 1/mm.
+    pub rms_per_mm: f64,
+    /// 95 % of their area has less.
+    pub p95_per_mm: f64,
+    /// 99 % of their area has less.
+    pub p99_per_mm: f64,
+    /// Root mean square on the mesh, 1/mm.
+    pub mesh_rms_per_mm: f64,
+    /// 95 % of its area has less.
+    pub mesh_p95_per_mm: f64,
+    /// 99 % of its area has less.
+    pub mesh_p99_per_mm: f64,
+}
+
 /// Feature edges of one kind.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FeatureFigures {
@@ -282,6 +300,8 @@ pub struct SurfaceFigures {
     pub deviation_original: Option<DeviationFigures>,
     /// Over edges of patches that are not features; `null` without such edges.
     pub normal_jump_deg: Option<NormalJump>,
+    /// Of the patches beside the mesh; `null` without patches or free vertices.
+    pub curvature: Option<CurvatureFigures>,
     /// Feature edges by kind.
     pub features: Vec<FeatureFigures>,
     /// Largest distance between the two faces at an edge, from the one surface to the other; exactly 0 where patches

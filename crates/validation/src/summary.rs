@@ -193,6 +193,16 @@ impl Report {
             if let Some(d) = &s.deviation_original {
                 writeln!(text, "           from the original: {}", deviation(d))?;
             }
+            if let Some(c) = &s.curvature {
+                writeln!(
+                    text,
+                    "           mean curvature: rms {}, p99 {} per mm; of the mesh: rms {}, p99 {} per mm",
+                    number(c.rms_per_mm),
+                    number(c.p99_per_mm),
+                    number(c.mesh_rms_per_mm),
+                    number(c.mesh_p99_per_mm)
+                )?;
+            }
             if let Some(j) = &s.normal_jump_deg {
                 let [x, y, z] = j.max_at.map(number);
                 writeln!(

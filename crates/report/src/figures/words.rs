@@ -5,7 +5,8 @@ use topipe_progress::number;
 
 /// The unit that the end of a name tells, and the name without it.
 pub(super) fn unit(key: &str) -> (&str, &str) {
-    const UNITS: [(&str, &str); 9] = [
+    const UNITS: [(&str, &str); 10] = [
+        ("_per_mm", "1/mm"),
         ("_mm4", "mm\u{2074}"),
         ("_mm3", "mm\u{b3}"),
         ("_mm2", "mm\u{b2}"),

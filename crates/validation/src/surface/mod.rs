@@ -3,6 +3,7 @@
 mod climb;
 mod complex;
 mod continuity;
+mod curvature;
 mod features;
 mod grid;
 mod shapes;
@@ -111,6 +112,7 @@ pub(crate) fn figures(
         deviation: None,
         deviation_original: None,
         normal_jump_deg,
+        curvature: curvature::figures(surface, reference),
         features: features::figures(surface, &reference.mesh, &reference_surface.index),
         gap_mm,
         planes: surface.faces.len() - cylinders.len(),
