@@ -52,7 +52,7 @@ pub enum SmoothingError {
     /// No vertex may move, but for those that slide in detected planes while the volume is to be kept.
     #[error(
         "all {vertices} vertices are frozen ({non_design} by non-design labels, the others by detected planes and \
-         holes, in which they could only slide, or by the part itself), so there is nothing to smooth; set `freeze_non_design`, `detect_planes` or \
+         holes, in which they could only slide, by added edges, or by the part itself), so there is nothing to smooth; set `freeze_non_design`, `detect_planes` or \
          `detect_holes` to false, or `iterations` to 0"
     )]
     EverythingFrozen {

@@ -117,7 +117,8 @@ pub struct Parameters {
     pub plane_area: f64,
     /// Largest distance of a vertex from the cylinder of its hole, in mean edge lengths of the hole's wall.
     pub hole_tolerance: f64,
-    /// Smallest dihedral angle of a sharp feature edge between two frozen faces, degrees.
+    /// Smallest dihedral angle of a sharp feature edge between two frozen faces, and, on the input, of an edge that
+    /// `features` adds; degrees.
     pub sharp_angle: f64,
     /// Blunt edges with a larger dihedral angle than this after the last iteration, degrees; 180 leaves them.
     pub spike_angle: f64,
@@ -125,7 +126,9 @@ pub struct Parameters {
     /// until none does.
     pub keep_embedded: bool,
     /// Features to add, drop or pin, in this order: `{ action = "pin", shape = "hole", diameter = 6.0, space = { type =
-    /// "cylinder", point = [0, 0, 0], axis = [0, 0, 1], length = 12.0, diameter = 8.0 } }`.
+    /// "cylinder", point = [0, 0, 0], axis = [0, 0, 1], length = 12.0, diameter = 8.0 } }`. Entries about edges see the
+    /// faces that all entries about faces leave; those that drop see what is pinned. With the method `contract` none
+    /// counts.
     pub features: Vec<FeatureOverride>,
 }
 

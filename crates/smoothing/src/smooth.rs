@@ -2,7 +2,7 @@
 
 use crate::alpha;
 use crate::blocks::Blocks;
-use crate::features::{self, Features};
+use crate::features::{self, Candidates, Features};
 use crate::finish::{Finish, Mended};
 use crate::kernel::{Change, Domain, Slide};
 use crate::locality::{self, Order};
@@ -96,7 +96,14 @@ fn smooth_as_numbered(
     let mut features = features::detect(&part, &connectivity, parameters, progress)?;
     let mut record =
         SmoothingRecord { method: parameters.method.name().to_owned(), ..SmoothingRecord::default() };
-    let frozen = frozen(&part, parameters, &features);
+    let added = features::added(&part, &connectivity, &features, parameters, progress)?;
+    let mut frozen = frozen(&part, parameters, &features);
+    // Along an added edge nothing is known of the faces: they are not solid.
+    let solid: Vec<bool> = mesh.triangles.iter().map(|t| t.iter().all(|v| frozen[v.index()])).collect();
+    if !added.is_empty() {
+        added.iter().flat_map(|e| e.vertices).for_each(|v| frozen[v.index()] = true);
+        features.sliding.retain(|s| !frozen[s.vertex as usize]);
+    }
     let positions = if parameters.most_iterations() == 0 {
         record.converged = true;
         mesh.positions.clone()
@@ -125,23 +132,19 @@ fn smooth_as_numbered(
         },
     };
     let smoothed = &part.mesh;
-    let solid: Vec<bool> = smoothed.triangles.iter().map(|t| t.iter().all(|v| frozen[v.index()])).collect();
     features.measure(smoothed);
-    let mut feature_edges: Vec<_> =
-        part.feature_edges.iter().filter(|e| e.kind == FeatureKind::User).copied().collect();
+    let mut named: Vec<_> =
+        part.feature_edges.iter().filter(|e| e.kind == FeatureKind::User).copied().chain(added).collect();
+    named.sort_unstable_by_key(|e| e.vertices);
+    named.dedup();
     // Between faces of which nothing is known no edge is a feature.
     let known = !features.regions.is_empty() || solid.contains(&true);
-    let edges = if known {
-        features::feature_edges(smoothed, &connectivity, &features, &solid, parameters)
-    } else {
-        Vec::new()
+    let candidates = match known {
+        true => Candidates::find(smoothed, &connectivity, &features, &solid, parameters),
+        false => Candidates::default(),
     };
-    for edge in edges {
-        if !part.feature_edges.iter().any(|e| e.kind == FeatureKind::User && e.vertices == edge.vertices) {
-            feature_edges.push(edge);
-        }
-    }
-    feature_edges.sort_unstable_by_key(|e| e.vertices);
+    let feature_edges =
+        features::settle(&part, &connectivity, &features, (candidates, named), parameters, progress)?;
     Ok(Part {
         regions: features.regions,
         region_of_face: features.region_of_face,

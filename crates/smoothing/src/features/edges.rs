@@ -15,7 +15,8 @@ const SHORTEST_CHAIN: f64 = 4.0;
 
 /// The feature edges of a mesh with these regions, sorted by their vertices.
 ///
-/// `solid` says which faces are frozen in the sense of being exact: all their vertices are.
+/// `solid` says which faces are frozen in the sense of being exact: all their vertices are. What
+/// [`Parameters::features`] says about edges is not applied: [`crate::smooth`] does.
 pub fn feature_edges(
     mesh: &TriangleMesh,
     connectivity: &Connectivity,
@@ -23,59 +24,95 @@ pub fn feature_edges(
     solid: &[bool],
     parameters: &Parameters,
 ) -> Vec<FeatureEdge> {
-    let cosine = parameters.sharp_angle.to_radians().cos();
-    let is_hole = |r: RegionId| {
-        r.is_some() && matches!(features.regions[r.index()].shape, RegionShape::Cylinder { hole: true, .. })
-    };
-    let mut sharp: Vec<(HalfEdgeId, f64, FeatureKind)> = Vec::new();
-    let mut edges = Vec::new();
-    for h in connectivity.edges() {
-        let twin = connectivity.twin(h);
-        if !twin.is_some() {
-            continue;
-        }
-        let (f, g) = (h.face(), twin.face());
-        let (here, there) = (features.region_of_face[f.index()], features.region_of_face[g.index()]);
-        if here == there && here.is_some() {
-            continue;
-        }
-        if is_hole(here) || is_hole(there) {
-            edges.push(edge(connectivity, h, FeatureKind::HoleRim));
-            continue;
-        }
-        if mesh.normal(f).dot(mesh.normal(g)) > cosine {
-            continue;
-        }
-        let known = |r: RegionId, face: usize| r.is_some() || solid[face];
-        let kind = if known(here, f.index()) && known(there, g.index()) {
-            FeatureKind::Sharp
-        } else if parameters.outlines_as_features && (here.is_some() || there.is_some()) {
-            FeatureKind::RegionBorder
-        } else {
-            continue;
-        };
-        let length = mesh.position(connectivity.origin(h)).distance(mesh.position(connectivity.target(h)));
-        sharp.push((h, length, kind));
-    }
-    let shortest = SHORTEST_CHAIN * mesh.mean_edge_length();
-    let mut chains = Chains { parent: (0..mesh.vertex_count() as u32).collect() };
-    for &(h, ..) in &sharp {
-        chains.join(connectivity.origin(h), connectivity.target(h));
-    }
-    let mut lengths = vec![0.0; mesh.vertex_count()];
-    for &(h, length, _) in &sharp {
-        lengths[chains.root(connectivity.origin(h).0) as usize] += length;
-    }
-    for &(h, _, kind) in &sharp {
-        if lengths[chains.root(connectivity.origin(h).0) as usize] >= shortest {
-            edges.push(edge(connectivity, h, kind));
-        }
-    }
-    edges.sort_unstable_by_key(|e| e.vertices);
-    edges
+    Candidates::find(mesh, connectivity, features, solid, parameters).listed(mesh, connectivity, |_| false)
 }
 
-fn edge(connectivity: &Connectivity, h: HalfEdgeId, kind: FeatureKind) -> FeatureEdge {
+/// Edges that are features unless their chain is too short.
+#[derive(Default)]
+pub(crate) struct Candidates {
+    /// Rims of holes, which are features in any case.
+    rims: Vec<FeatureEdge>,
+    /// Edges with a dihedral angle, each by one of its half-edges.
+    pub(super) sharp: Vec<(HalfEdgeId, FeatureKind)>,
+}
+
+impl Candidates {
+    pub(crate) fn find(
+        mesh: &TriangleMesh,
+        connectivity: &Connectivity,
+        features: &Features,
+        solid: &[bool],
+        parameters: &Parameters,
+    ) -> Self {
+        let cosine = parameters.sharp_angle.to_radians().cos();
+        let mut found = Self::default();
+        for h in connectivity.edges() {
+            let twin = connectivity.twin(h);
+            if !twin.is_some() {
+                continue;
+            }
+            let (f, g) = (h.face(), twin.face());
+            let (here, there) = (features.region_of_face[f.index()], features.region_of_face[g.index()]);
+            if here == there && here.is_some() {
+                continue;
+            }
+            if is_hole(features, here) || is_hole(features, there) {
+                found.rims.push(edge(connectivity, h, FeatureKind::HoleRim));
+                continue;
+            }
+            if mesh.normal(f).dot(mesh.normal(g)) > cosine {
+                continue;
+            }
+            let known = |r: RegionId, face: usize| r.is_some() || solid[face];
+            let kind = if known(here, f.index()) && known(there, g.index()) {
+                FeatureKind::Sharp
+            } else if parameters.outlines_as_features && (here.is_some() || there.is_some()) {
+                FeatureKind::RegionBorder
+            } else {
+                continue;
+            };
+            found.sharp.push((h, kind));
+        }
+        found
+    }
+
+    /// Those that are features, sorted by their vertices: a short chain only where one of its edges is `kept`.
+    pub(super) fn listed(
+        self,
+        mesh: &TriangleMesh,
+        connectivity: &Connectivity,
+        kept: impl Fn(HalfEdgeId) -> bool,
+    ) -> Vec<FeatureEdge> {
+        let Self { rims: mut edges, sharp } = self;
+        let shortest = SHORTEST_CHAIN * mesh.mean_edge_length();
+        let mut chains = Chains { parent: (0..mesh.vertex_count() as u32).collect() };
+        for &(h, _) in &sharp {
+            chains.join(connectivity.origin(h), connectivity.target(h));
+        }
+        let mut lengths = vec![0.0; mesh.vertex_count()];
+        for &(h, _) in &sharp {
+            let root = chains.root(connectivity.origin(h).0) as usize;
+            let ends = [connectivity.origin(h), connectivity.target(h)].map(|v| mesh.position(v));
+            lengths[root] += if kept(h) { f64::INFINITY } else { ends[0].distance(ends[1]) };
+        }
+        for &(h, kind) in &sharp {
+            if lengths[chains.root(connectivity.origin(h).0) as usize] >= shortest {
+                edges.push(edge(connectivity, h, kind));
+            }
+        }
+        edges.sort_unstable_by_key(|e| e.vertices);
+        edges
+    }
+}
+
+/// Whether this is the region of a hole, whose borders are rims.
+pub(super) fn is_hole(features: &Features, region: RegionId) -> bool {
+    region.is_some()
+        && matches!(features.regions[region.index()].shape, RegionShape::Cylinder { hole: true, .. })
+}
+
+/// The edge of a half-edge as a feature.
+pub(super) fn edge(connectivity: &Connectivity, h: HalfEdgeId, kind: FeatureKind) -> FeatureEdge {
     let (a, b) = (connectivity.origin(h), connectivity.target(h));
     FeatureEdge { vertices: [a.min(b), a.max(b)], kind }
 }

@@ -11,13 +11,16 @@
 //! orientation, and freeze the wall of a hole together with its rims.
 
 mod borders;
+mod chains;
 mod cylinder;
+mod edge_overrides;
 mod edges;
 mod fit;
 mod noise;
 mod overrides;
 mod plane;
 pub mod published;
+mod space;
 
 use crate::{Method, Parameters, SmoothingError};
 use topipe_mesh::{
@@ -25,9 +28,13 @@ use topipe_mesh::{
 };
 use topipe_progress::Progress;
 
+pub use chains::{EdgeChain, edge_chains};
+pub(crate) use edge_overrides::{added, settle};
+pub(crate) use edges::Candidates;
 pub use edges::feature_edges;
 use overrides::Claims;
-pub use overrides::{Action, FeatureOverride, Shape, Space};
+pub use overrides::{Action, FeatureOverride, Shape};
+pub use space::Space;
 
 /// What was found on a part.
 #[derive(Debug, Clone, PartialEq)]

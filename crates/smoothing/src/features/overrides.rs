@@ -2,23 +2,29 @@
 
 use super::borders::NONE;
 use super::noise::Tolerance;
+use super::space::{self, Space};
 use super::{cylinder, distance, fit};
 use crate::SmoothingError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use topipe_mesh::{Connectivity, DVec3, Design, FaceId, Part, RegionShape};
+use topipe_mesh::{Connectivity, FaceId, Part, RegionShape};
 
 /// What is to be done with a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Action {
     /// Make a region of the faces in the given space, whatever their number; an error where they do not lie on one
-    /// shape.
+    /// shape. With `shape = "edge"`: make feature edges of the edges in the space whose dihedral angle on the input
+    /// mesh is larger than `sharp_angle`, and freeze their vertices, noise included; an error where there is none.
     Add,
-    /// Give up the regions of which most faces lie in the given space; an error where there is none.
+    /// Give up the regions of which most faces lie in the given space; an error where there is none. With `shape =
+    /// "edge"`: sharp edges in the space are no feature edges any more, and the fit rounds them; an error where there is
+    /// none. The border of a face of known shape stays an edge of the solid all the same, where the tiling makes a face
+    /// of it: a remark says so. What was added is not dropped.
     Drop,
     /// Insist on a region in the given space: one that was found is kept however small, one that was overlooked is
-    /// added; an error where neither is possible.
+    /// added; an error where neither is possible. With `shape = "edge"`: chains of sharp edges in the space are kept
+    /// however short; an error where there is none.
     Pin,
 }
 
@@ -26,7 +32,7 @@ pub enum Action {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shape {
-    /// Any of the others.
+    /// A face of any of the shapes below; no edge.
     #[default]
     Any,
     /// A flat face.
@@ -37,32 +43,8 @@ pub enum Shape {
     Hole,
     /// The outside of a cylinder.
     Boss,
-}
-
-/// A part of space. Lengths in mm. A face lies in it when its corners do.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Space {
-    /// An axis-aligned box.
-    Box {
-        /// Lowest corner, mm.
-        min: [f64; 3],
-        /// Highest corner, mm.
-        max: [f64; 3],
-    },
-    /// A solid circular cylinder.
-    Cylinder {
-        /// Centre of one end, mm.
-        point: [f64; 3],
-        /// Direction to the other end; its length does not matter.
-        axis: [f64; 3],
-        /// Length, mm.
-        length: f64,
-        /// Diameter, mm.
-        diameter: f64,
-    },
-    /// All non-design faces.
-    NonDesign,
+    /// Sharp edges of the mesh, but for rims of holes, which go with their hole.
+    Edge,
 }
 
 /// One entry of `features`.
@@ -71,7 +53,7 @@ pub enum Space {
 pub struct FeatureOverride {
     /// "add", "drop" or "pin".
     pub action: Action,
-    /// "any" (default), "plane", "cylinder", "hole" or "boss".
+    /// "any" (default: any face), "plane", "cylinder", "hole", "boss" or "edge".
     #[serde(default)]
     pub shape: Shape,
     /// Where: `{ type = "box", min, max }`, `{ type = "cylinder", point, axis, length, diameter }` or `{ type =
@@ -82,8 +64,7 @@ pub struct FeatureOverride {
     pub diameter: Option<f64>,
 }
 
-/// Slack of a space and of an expected diameter over the diagonal of the part and the diameter.
-const SLACK: f64 = 1e-6;
+/// Slack of an expected diameter, over the diameter.
 const DIAMETER_SLACK: f64 = 1e-3;
 
 /// An added shape has at least this many faces, and this share of those in its space: two facets lie in a plane on any
@@ -100,22 +81,8 @@ const MOST: f64 = 0.5;
 impl FeatureOverride {
     /// What is wrong with the entry itself.
     pub(crate) fn problem(&self) -> Option<String> {
-        let finite = |v: &[f64; 3]| v.iter().all(|x| x.is_finite());
-        match &self.space {
-            Space::Box { min, max } => {
-                if !finite(min) || !finite(max) || (0..3).any(|k| min[k] > max[k]) {
-                    return Some(format!("the box from {min:?} to {max:?} is empty"));
-                }
-            }
-            Space::Cylinder { point, axis, length, diameter } => {
-                if !finite(point) || !finite(axis) || DVec3::from_array(*axis).length() == 0.0 {
-                    return Some("the axis of the cylinder has no direction".to_owned());
-                }
-                if !(*length > 0.0 && *diameter > 0.0 && length.is_finite() && diameter.is_finite()) {
-                    return Some("length and diameter of the cylinder must be above 0".to_owned());
-                }
-            }
-            Space::NonDesign => {}
+        if let Some(problem) = self.space.problem() {
+            return Some(problem);
         }
         match self.diameter {
             Some(_) if self.action != Action::Pin => {
@@ -123,33 +90,9 @@ impl FeatureOverride {
             }
             Some(d) if !(d > 0.0 && d.is_finite()) => Some(format!("the diameter {d} is not above 0")),
             Some(_) if self.shape == Shape::Plane => Some("a plane has no diameter".to_owned()),
+            Some(_) if self.shape == Shape::Edge => Some("an edge has no diameter".to_owned()),
             _ => None,
         }
-    }
-
-    fn faces(&self, part: &Part) -> Vec<FaceId> {
-        let mesh = &part.mesh;
-        let slack = SLACK * mesh.diagonal();
-        let inside = |p: DVec3| match self.space {
-            Space::Box { min, max } => {
-                let slack = DVec3::splat(slack);
-                p.cmpge(DVec3::from_array(min) - slack).all() && p.cmple(DVec3::from_array(max) + slack).all()
-            }
-            Space::Cylinder { point, axis, length, diameter } => {
-                let axis = DVec3::from_array(axis).normalize_or_zero();
-                let d = p - DVec3::from_array(point);
-                let along = axis.dot(d);
-                (-slack..=length + slack).contains(&along)
-                    && (d - axis * along).length() <= diameter / 2.0 + slack
-            }
-            Space::NonDesign => true,
-        };
-        mesh.faces()
-            .filter(|f| match self.space {
-                Space::NonDesign => part.design[f.index()] == Design::NonDesign,
-                _ => mesh.corners(*f).into_iter().all(inside),
-            })
-            .collect()
     }
 
     fn is_meant(&self, shape: &RegionShape) -> bool {
@@ -192,11 +135,14 @@ pub(super) fn apply(
     tolerance: Tolerance,
     claims: &mut Claims,
 ) -> Result<(), SmoothingError> {
-    for (k, entry) in overrides.iter().enumerate() {
+    for (k, entry) in overrides.iter().enumerate().filter(|(_, entry)| entry.shape != Shape::Edge) {
         let fail = |problem: String| SmoothingError::Feature { entry: k + 1, problem };
-        let inside = entry.faces(part);
+        let inside = entry.space.faces(part);
         if inside.is_empty() {
-            return Err(fail(format!("there is no face in its space; the part reaches {}", reach(part))));
+            return Err(fail(format!(
+                "there is no face in its space; the part reaches {}",
+                space::reach(part)
+            )));
         }
         let meant = regions_inside(entry, &inside, claims);
         match entry.action {
@@ -388,6 +334,7 @@ fn name(shape: Shape) -> &'static str {
         Shape::Cylinder => "cylinder",
         Shape::Hole => "hole",
         Shape::Boss => "boss",
+        Shape::Edge => "edge",
     }
 }
 
@@ -423,9 +370,4 @@ fn list(claims: &Claims) -> String {
         (false, 0) => format!("found were {}", found.join(", ")),
         (false, more) => format!("found were {} and {more} more", found.join(", ")),
     }
-}
-
-fn reach(part: &Part) -> String {
-    let (low, high) = part.mesh.bounds();
-    format!("from {low:.3} to {high:.3} mm")
 }

@@ -3,6 +3,7 @@
 mod alpha;
 mod bad_input;
 mod detection;
+mod edge_overrides;
 mod embedding;
 mod guarantees;
 mod invariance;

@@ -27,6 +27,23 @@ pub(crate) fn sphere(levels: usize, center: DVec3) -> TriangleMesh {
     TriangleMesh::from_arrays(points.iter().map(|p| (center + 10.0 * *p).to_array()).collect(), triangles)
 }
 
+/// Two caps of a sphere of radius 10 that meet along a circle in the plane z = 0, where their normals differ by
+/// 60 degrees: free surface with a sharp edge of `4 * 2^levels` edges, which are chords of a radius of `10 sin(60)`.
+pub(crate) fn lens(levels: usize) -> TriangleMesh {
+    let mut mesh = sphere(levels, DVec3::ZERO);
+    let rim = 60f64.to_radians();
+    for p in &mut mesh.positions {
+        let (across, up) = (p.x.hypot(p.y), p.z.abs());
+        let from_pole = rim * across.atan2(up) / std::f64::consts::FRAC_PI_2;
+        let (radius, height) = (10.0 * from_pole.sin(), 10.0 * (from_pole.cos() - rim.cos()));
+        let scale = if across > 0.0 { radius / across } else { 0.0 };
+        // Exactly in the plane, whatever the rounding of the angle.
+        let z = if p.z == 0.0 { 0.0 } else { height.copysign(p.z) };
+        *p = DVec3::new(scale * p.x, scale * p.y, z);
+    }
+    mesh
+}
+
 /// Moves each vertex by up to `size` along each axis.
 pub(crate) fn shake(mesh: &mut TriangleMesh, size: f64, seed: u64) {
     let mut noise = Noise(seed);
