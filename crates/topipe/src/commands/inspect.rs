@@ -8,6 +8,7 @@ use std::fmt::Write;
 use std::path::Path;
 use topipe_engine::{ArtifactKind, ExitCode, codec};
 use topipe_mesh::{Connectivity, Design, Part, RegionShape};
+use topipe_smoothing::features::edge_chains;
 
 pub(crate) fn run(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let (path, bytes) = super::target::read(&arguments.target)?;
@@ -93,8 +94,10 @@ fn mesh_file(path: &Path, bytes: &[u8]) -> Result<String, Failure> {
 fn describe_part(part: &Part) -> String {
     let mesh = &part.mesh;
     let mut text = format!("{} triangles, {} vertices\n", mesh.face_count(), mesh.vertex_count());
+    let mut edges = String::new();
     match Connectivity::build(mesh) {
         Ok(connectivity) => {
+            edges = describe_edges(part, &connectivity);
             let genus = connectivity.genus(mesh).map_or("unknown".to_owned(), |genus| genus.to_string());
             let _ = writeln!(text, "{} component(s), genus {genus}", connectivity.components().1);
         }
@@ -114,8 +117,26 @@ fn describe_part(part: &Part) -> String {
         part.feature_edges.len()
     );
     text += &describe_regions(part);
+    text += &edges;
     for repair in &part.import.repairs {
         let _ = writeln!(text, "repaired: {} ({})", repair.what, repair.count);
+    }
+    text
+}
+
+/// The chains of sharp edges and of edges named by the user, longest first.
+fn describe_edges(part: &Part, connectivity: &Connectivity) -> String {
+    let mut text = String::new();
+    for (id, chain) in edge_chains(part, connectivity).iter().enumerate() {
+        let (edges, angle) = (chain.edges(), chain.angle);
+        // Outward, so that the box that is written from it holds the chain.
+        let (min, max) = ((1e3 * chain.min).floor() / 1e3, (1e3 * chain.max).ceil() / 1e3);
+        let _ = writeln!(
+            text,
+            "edge {id}: {}, {edges} edge(s), {:.2} mm, dihedral angle at most {angle:.2} degrees, from {min:.3} to {max:.3} mm",
+            chain.kind_name(),
+            chain.length
+        );
     }
     text
 }
