@@ -28,6 +28,31 @@ fn inspect_tells_what_is_in_a_mesh_and_in_a_result() {
 }
 
 #[test]
+fn edges_are_listed_with_the_box_that_names_them() {
+    let shop = Workshop::new();
+    shop.edit("method = \"taubin\"\ndetect_planes = false", "iterations = 0");
+    shop.edit("\"smooth.ply\" = \"smooth\"", "\"features.csv\" = \"smooth\"");
+    let edges = || {
+        let ended = shop.topipe(&["run", "box.toml"]);
+        assert_eq!(ended.code, 0, "{}", ended.stderr);
+        let text = shop.topipe(&["inspect", "smooth", "--pipeline", "box.toml"]).stdout;
+        text.lines().filter(|l| l.starts_with("edge ")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let all = edges();
+    assert_eq!(all.len(), 12, "{all:?}");
+    let row = "sharp, 6 edge(s), 3.00 mm, dihedral angle at most 90.00 degrees, \
+               from [0.000, 0.000, 0.000] to [3.000, 0.000, 0.000] mm";
+    assert!(all[..4].iter().any(|l| l.ends_with(row)), "{all:?}");
+    let csv = shop.read("topipe-out/box/features.csv");
+    assert!(csv.contains("\n,edge,,,,,,,,,,,0,0,0,3,0,0,6,3,90,sharp\n"), "{csv}");
+    let space = "{ type = \"box\", min = [0, 0, 0], max = [3, 0, 0] }";
+    let drop = format!("features = [{{ action = \"drop\", shape = \"edge\", space = {space} }}]");
+    shop.edit("iterations = 0", &format!("iterations = 0\n{drop}"));
+    let fewer = edges();
+    assert!(fewer.len() == 11 && !fewer.iter().any(|l| l.ends_with(row)), "{fewer:?}");
+}
+
+#[test]
 fn results_and_meshes_can_be_drawn() {
     let shop = Workshop::new();
     shop.edit("\"smooth.ply\" = \"smooth\"", "\"smooth.png\" = \"smooth\"");

@@ -96,7 +96,7 @@ pub(crate) fn added(
             false => "",
         };
         progress.remark(&format!(
-            "{edges} edges in {chains} chains are added and their vertices frozen, as `features` asks{noise}"
+            "{edges} edge(s) in {chains} chain(s) are added and their vertices frozen, as `features` asks{noise}"
         ));
     }
     Ok(added)

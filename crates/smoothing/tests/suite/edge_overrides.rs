@@ -176,7 +176,7 @@ fn an_edge_of_the_free_surface_is_added_and_held() {
     };
     let text = remarks(&part);
     assert!(
-        text.contains("64 edges in 1 chains are added") && !text.contains("noise of the input"),
+        text.contains("64 edge(s) in 1 chain(s) are added") && !text.contains("noise of the input"),
         "{text}"
     );
     let mut noisy = part.clone();
