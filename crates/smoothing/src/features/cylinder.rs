@@ -50,6 +50,13 @@ const ONE_PLACE: f64 = 0.1;
 /// Spread of the distances of a wall's vertices, in median absolute deviations, that still belong to it.
 const OUTLIER: f64 = 5.0 * 1.4826;
 
+/// Cosine of the dihedral angle from which on a border of a wall is an edge: 30 degrees.
+const SHARP_COSINE: f64 = 0.866;
+
+/// Share of the border of a wall that is an edge, where the wall is not exact: a hole that the optimizer has opened on one side has a
+/// quarter of its rims.
+const SHARP_SHARE: f64 = 0.25;
+
 /// A cylinder that was found.
 pub(super) struct Wall {
     pub(super) shape: RegionShape,
@@ -418,9 +425,12 @@ impl Search<'_> {
                 1 + angles.windows(2).filter(|w| (w[1] - w[0]) * cylinder.radius > ONE_PLACE * edge).count();
             return (places >= FEWEST_PLACES && rms <= self.rounding).then_some(false);
         }
-        // A cone, a barrel, an oval: the radius follows the height or the angle.
+        // A cone, a barrel, an oval, a bent tube: the radius follows the height or the angle.
         if rms <= self.rounding {
             return Some(true);
+        }
+        if !self.ends_sharply(faces) {
+            return None;
         }
         let height = |p: DVec3| cylinder.axis.dot(p - cylinder.point);
         let (low, high) = points
@@ -429,9 +439,37 @@ impl Search<'_> {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
         let along = |p: DVec3| 2.0 * (height(p) - low) / (high - low).max(f64::MIN_POSITIVE) - 1.0;
         let off = |p: DVec3| cylinder.distance(p);
+        // A slice of a torus bends away to one side with the square of the height.
+        let bend: (f64, f64) = points.iter().fold((0.0, 0.0), |(c, s), &p| {
+            let (sin, cos) = angle(p).sin_cos();
+            let arm = (along(p).powi(2) - 1.0 / 3.0) * off(p);
+            (c + arm * cos, s + arm * sin)
+        });
+        let to = bend.1.atan2(bend.0);
         let wrong = is_systematic(self.mesh, faces, off, |p| [along(p), (2.0 * angle(p)).cos()])
-            || is_systematic(self.mesh, faces, off, |p| [along(p), (2.0 * angle(p)).sin()]);
+            || is_systematic(self.mesh, faces, off, |p| [along(p), (2.0 * angle(p)).sin()])
+            || is_systematic(self.mesh, faces, off, |p| [along(p).powi(2), (angle(p) - to).cos()]);
         (!wrong).then_some(true)
+    }
+}
+
+impl Search<'_> {
+    /// Whether the wall ends at edges, along a good part of its border: a hole does in the faces that it is drilled through. A wall that is not
+    /// exact and goes over into what is beside it is a piece of a tube that bends or widens.
+    fn ends_sharply(&self, faces: &[FaceId]) -> bool {
+        let (mut sharp, mut whole) = (0.0, 0.0);
+        for h in border_half_edges(self.connectivity, faces, |f| faces.binary_search(&f).is_ok()) {
+            let (a, b) = (self.mesh.origin(h), self.mesh.target(h));
+            let length = self.mesh.position(a).distance(self.mesh.position(b));
+            whole += length;
+            let twin = self.connectivity.twin(h);
+            if !twin.is_some()
+                || self.normals[h.face().index()].dot(self.normals[twin.face().index()]) < SHARP_COSINE
+            {
+                sharp += length;
+            }
+        }
+        sharp > SHARP_SHARE * whole
     }
 }
 

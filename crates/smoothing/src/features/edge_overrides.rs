@@ -91,13 +91,16 @@ pub(crate) fn added(
     if !added.is_empty() {
         let (edges, chains) = (added.len(), chains::of_edges(&part.mesh, connectivity, &added).len());
         // On noise nearly every edge is sharp, and where three meet a chain ends.
-        let noise = match edges < NOISE * chains {
-            true => "; chains this short are the noise of the input, and a narrower space leaves them out",
-            false => "",
-        };
-        progress.remark(&format!(
-            "{edges} edge(s) in {chains} chain(s) are added and their vertices frozen, as `features` asks{noise}"
-        ));
+        let added = format!(
+            "{edges} edge(s) in {chains} chain(s) are added and their vertices frozen, as `features` asks"
+        );
+        if edges < NOISE * chains {
+            progress.warn(&format!(
+                "{added}; chains this short are the noise of the input, and a narrower space leaves them out"
+            ));
+        } else {
+            progress.remark(&added);
+        }
     }
     Ok(added)
 }
@@ -161,7 +164,7 @@ pub(crate) fn settle(
         let (all, borders) = (dropped.len(), dropped.iter().filter(bordering).count());
         if borders > 0 {
             let which = if borders == all { "all".to_owned() } else { format!("{borders} of the") };
-            progress.remark(&format!(
+            progress.warn(&format!(
                 "entry {} of `features`: {which} {all} sharp edges that it drops are borders of faces of known \
                  shape, and remain edges of the solid where the tiling makes faces of these; to be rid of such an \
                  edge, drop the face",

@@ -3,7 +3,7 @@
 use super::border_half_edges;
 use super::fit;
 use super::noise::{Tolerance, is_systematic};
-use topipe_mesh::{Connectivity, DVec3, FaceId, RegionShape, TriangleMesh};
+use topipe_mesh::{Connectivity, DVec3, FaceId, HalfEdgeId, RegionShape, TriangleMesh};
 use topipe_progress::{Interrupted, Progress};
 
 /// Facets with less than this many squared mean edge lengths of area have normals that say nothing.
@@ -19,6 +19,13 @@ const HIGHEST_STEP: f64 = 1.5;
 /// Spread of the distances of a flat face's vertices, in median absolute deviations, that still belong to it: five
 /// standard deviations.
 const OUTLIER: f64 = 5.0 * 1.4826;
+
+/// Share of the bends of the edges inside, by angle and length, that the curvature of a smooth surface explains, from which on a face is
+/// part of one: on a torus nearly all, on a flat face with white noise about the root of two over their number.
+const SMOOTH_BENDS: f64 = 0.7;
+
+/// With fewer edges than this noise comes to that share by chance more often than once in a thousand.
+const FEWEST_BENDS: usize = 24;
 
 /// A flat patch that was found.
 pub(super) struct Flat {
@@ -178,7 +185,43 @@ impl Search<'_> {
         let size = corners().map(|p| p.distance(plane.point)).fold(f64::MIN_POSITIVE, f64::max);
         let height = |p: DVec3| plane.normal.dot(p - plane.point);
         let place = |p: DVec3| [u.dot(p - plane.point) / size, v.dot(p - plane.point) / size];
-        is_systematic(self.mesh, faces, height, place)
+        self.bends_like_a_surface(plane, faces) || is_systematic(self.mesh, faces, height, place)
+    }
+
+    /// True when the edges inside bend as those of a smooth surface do: to one side along each of two directions, as around the top of a
+    /// torus, or on its inner side, where the sides differ. Noise bends as much to the one as to the other. The heights of a few rings of
+    /// facets are no polynomial of their places.
+    ///
+    /// The sum of bend times length times the square of the direction is the integral of the curvature tensor over the face
+    /// (Cohen-Steiner, Morvan 2003).
+    fn bends_like_a_surface(&self, plane: &Plane, faces: &[FaceId]) -> bool {
+        let (u, v) = plane.normal.any_orthonormal_pair();
+        let (mut tensor, mut absolute, mut count) = ([0.0; 3], 0.0, 0);
+        for &f in faces {
+            for k in 0..3 {
+                let h = HalfEdgeId::of(f, k);
+                let across = self.connectivity.neighbor(f, k);
+                if !across.is_some() || across < f || faces.binary_search(&across).is_err() {
+                    continue;
+                }
+                let along = self.mesh.position(self.mesh.target(h)) - self.mesh.position(self.mesh.origin(h));
+                let length = along.length();
+                let (m, n) = (self.area_vectors[f.index()], self.area_vectors[across.index()]);
+                let bend = m.cross(n).dot(along).atan2(m.dot(n) * length) * length;
+                let direction = along.normalize_or_zero();
+                let (x, y) = (direction.dot(u), direction.dot(v));
+                for (sum, product) in tensor.iter_mut().zip([x * x, x * y, y * y]) {
+                    *sum += bend * product;
+                }
+                absolute += bend.abs();
+                count += 1;
+            }
+        }
+        let [xx, xy, yy] = tensor;
+        let (mean, off) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
+        // Of both principal values.
+        let sum = (mean + off).abs() + (mean - off).abs();
+        count >= FEWEST_BENDS && sum > SMOOTH_BENDS * absolute
     }
 
     fn grow(&mut self, plane: &mut Plane, seed: FaceId, limit: f64, refit: bool) -> Vec<FaceId> {

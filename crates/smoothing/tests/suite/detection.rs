@@ -1,7 +1,8 @@
 //! Holes and flat faces against what is known about each case.
 
-use crate::shapes::{shake, sphere, voxels};
+use crate::shapes::{rod, shake, sphere, tube, voxels};
 use crate::{CASES, Noise, facts, read};
+use std::f64::consts::TAU;
 use topipe_mesh::{Connectivity, DVec3, Part, Region, RegionShape};
 use topipe_progress::Progress;
 use topipe_smoothing::Parameters;
@@ -272,6 +273,36 @@ fn curved_surfaces_have_no_flat_faces_and_no_holes() {
     assert_eq!(found(&Part::new(mesh.clone())).regions, []);
     shake(&mut mesh, 0.05, 1);
     assert_eq!(found(&Part::new(mesh)).regions, []);
+}
+
+/// A slice of a bent tube is nearly a cylinder, and the rings around its top and its inner side are nearly flat.
+#[test]
+fn bent_tubes_have_no_flat_faces_and_no_cylinders() {
+    let circle = |t: f64| 20.0 * DVec3::new((TAU * t).cos(), (TAU * t).sin(), 0.0);
+    for counts in [[240, 84], [120, 42], [60, 24]] {
+        for radius in [7.0, 3.0] {
+            let mesh = tube(circle, |_| DVec3::Z, radius, counts);
+            assert!(mesh.volume() > 0.0);
+            let regions = found(&Part::new(mesh)).regions;
+            assert!(regions.is_empty(), "{counts:?} {radius}: {regions:?}");
+        }
+    }
+    // A trefoil bends and twists: no cylinder; what is left of flat faces is small.
+    let knot = |t: f64| {
+        let a = TAU * t;
+        10.0 * DVec3::new(a.sin() + 2.0 * (2.0 * a).sin(), a.cos() - 2.0 * (2.0 * a).cos(), -(3.0 * a).sin())
+    };
+    let mesh = tube(knot, knot, 3.5, [400, 30]);
+    let area = mesh.area();
+    let regions = found(&Part::new(mesh)).regions;
+    assert_eq!(diameters(&regions), [0.0; 0]);
+    assert!(regions.iter().map(|r| r.area).sum::<f64>() < 0.01 * area, "{regions:?}");
+    // A straight one between two ends is what it is, roughened or not.
+    for noise in [0.0, 0.005] {
+        let mut rod = rod();
+        shake(&mut rod, noise, 7);
+        assert_eq!(found(&Part::new(rod)).regions.len(), 3, "{noise}");
+    }
 }
 
 #[test]

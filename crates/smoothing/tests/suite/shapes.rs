@@ -44,6 +44,60 @@ pub(crate) fn lens(levels: usize) -> TriangleMesh {
     mesh
 }
 
+/// A tube of this `radius` around a closed curve over [0, 1], `around` facets about it and `along` along it. Its frame is made from
+/// `side`, which must not be parallel to the curve anywhere.
+pub(crate) fn tube(
+    curve: impl Fn(f64) -> DVec3,
+    side: impl Fn(f64) -> DVec3,
+    radius: f64,
+    [along, around]: [u32; 2],
+) -> TriangleMesh {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for i in 0..along {
+        let t = f64::from(i) / f64::from(along);
+        let tangent = (curve(t + 1e-5) - curve(t - 1e-5)).normalize();
+        let u = side(t).cross(tangent).normalize();
+        let v = tangent.cross(u);
+        for j in 0..around {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(j) / f64::from(around)).sin_cos();
+            points.push((curve(t) + radius * (cos * u + sin * v)).to_array());
+            let at = |i: u32, j: u32| i % along * around + j % around;
+            let q = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+            triangles.extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+        }
+    }
+    TriangleMesh::from_arrays(points, triangles)
+}
+
+/// A round rod of radius 5 and length 20 along z, 48 facets about it, with edges of about 0.65.
+pub(crate) fn rod() -> TriangleMesh {
+    const AROUND: u32 = 48;
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    // Rings up the middle of one end, up the wall, and into the middle of the other end.
+    let ends = (1..8).map(|k| f64::from(k) * 5.0 / 8.0);
+    let wall = (0..=30).map(|k| (5.0, f64::from(k) * 20.0 / 30.0));
+    let rings: Vec<(f64, f64)> =
+        ends.clone().map(|r| (r, 0.0)).chain(wall).chain(ends.rev().map(|r| (r, 20.0))).collect();
+    for &(radius, z) in &rings {
+        for j in 0..AROUND {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(j) / f64::from(AROUND)).sin_cos();
+            points.push([radius * cos, radius * sin, z]);
+        }
+    }
+    let at = |i: u32, j: u32| i * AROUND + j % AROUND;
+    let last = rings.len() as u32 - 1;
+    let poles = [points.len() as u32, points.len() as u32 + 1];
+    points.extend([[0.0, 0.0, 0.0], [0.0, 0.0, 20.0]]);
+    for j in 0..AROUND {
+        triangles.extend([[poles[0], at(0, j + 1), at(0, j)], [poles[1], at(last, j), at(last, j + 1)]]);
+        for i in 0..last {
+            let q = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+            triangles.extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+        }
+    }
+    TriangleMesh::from_arrays(points, triangles)
+}
+
 /// Moves each vertex by up to `size` along each axis.
 pub(crate) fn shake(mesh: &mut TriangleMesh, size: f64, seed: u64) {
     let mut noise = Noise(seed);
