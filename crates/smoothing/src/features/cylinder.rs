@@ -5,12 +5,12 @@
 //! coarse chords, makes both exact. The region then grows over all facets with vertices on the cylinder, with a
 //! tolerance that narrows to what these vertices themselves deviate.
 //!
-//! A wall that runs all around is accepted as it is. An arc of one must lie on the cylinder to rounding and be seen in
+//! A wall that runs all around and is not exact must end at edges, and its residuals must not follow a rule. An arc must lie on the cylinder to rounding and be seen in
 //! at least five places around it: any three parallel lines lie on one, and the four edges of two equal chamfers do.
 
-use super::border_half_edges;
 use super::fit::{Cylinder, Symmetric};
 use super::noise::{Tolerance, is_systematic};
+use super::rims::{ends_sharply, winds};
 use rayon::prelude::*;
 use topipe_mesh::{Connectivity, DVec3, FaceId, RegionShape, TriangleMesh, VertexId};
 use topipe_progress::{Interrupted, Progress};
@@ -49,13 +49,6 @@ const ONE_PLACE: f64 = 0.1;
 
 /// Spread of the distances of a wall's vertices, in median absolute deviations, that still belong to it.
 const OUTLIER: f64 = 5.0 * 1.4826;
-
-/// Cosine of the dihedral angle from which on a border of a wall is an edge: 30 degrees.
-const SHARP_COSINE: f64 = 0.866;
-
-/// Share of the border of a wall that is an edge, where the wall is not exact: a hole that the optimizer has opened on one side has a
-/// quarter of its rims.
-const SHARP_SHARE: f64 = 0.25;
 
 /// A cylinder that was found.
 pub(super) struct Wall {
@@ -429,7 +422,7 @@ impl Search<'_> {
         if rms <= self.rounding {
             return Some(true);
         }
-        if !self.ends_sharply(faces) {
+        if !ends_sharply(self.mesh, self.connectivity, faces) {
             return None;
         }
         let height = |p: DVec3| cylinder.axis.dot(p - cylinder.point);
@@ -451,59 +444,4 @@ impl Search<'_> {
             || is_systematic(self.mesh, faces, off, |p| [along(p).powi(2), (angle(p) - to).cos()]);
         (!wrong).then_some(true)
     }
-}
-
-impl Search<'_> {
-    /// Whether the wall ends at edges, along a good part of its border: a hole does in the faces that it is drilled through. A wall that is not
-    /// exact and goes over into what is beside it is a piece of a tube that bends or widens.
-    fn ends_sharply(&self, faces: &[FaceId]) -> bool {
-        let (mut sharp, mut whole) = (0.0, 0.0);
-        for h in border_half_edges(self.connectivity, faces, |f| faces.binary_search(&f).is_ok()) {
-            let (a, b) = (self.mesh.origin(h), self.mesh.target(h));
-            let length = self.mesh.position(a).distance(self.mesh.position(b));
-            whole += length;
-            let twin = self.connectivity.twin(h);
-            if !twin.is_some()
-                || self.normals[h.face().index()].dot(self.normals[twin.face().index()]) < SHARP_COSINE
-            {
-                sharp += length;
-            }
-        }
-        sharp > SHARP_SHARE * whole
-    }
-}
-
-/// True when a border of the faces runs once around the axis.
-fn winds(
-    mesh: &TriangleMesh,
-    connectivity: &Connectivity,
-    faces: &[FaceId],
-    angle: impl Fn(DVec3) -> f64,
-) -> bool {
-    let inside = |f: FaceId| faces.binary_search(&f).is_ok();
-    let border = border_half_edges(connectivity, faces, inside);
-    let mut seen = std::collections::BTreeSet::new();
-    for &start in &border {
-        let mut winding = 0.0;
-        let mut h = start;
-        while seen.insert(h) {
-            let step =
-                angle(mesh.position(connectivity.target(h))) - angle(mesh.position(connectivity.origin(h)));
-            let tau = std::f64::consts::TAU;
-            winding += step - tau * (step / tau).round();
-            // The next border half-edge: turn about the target inside the set.
-            h = h.next();
-            loop {
-                let twin = connectivity.twin(h);
-                if !twin.is_some() || !inside(twin.face()) {
-                    break;
-                }
-                h = twin.next();
-            }
-        }
-        if (winding.abs() - std::f64::consts::TAU).abs() < 0.1 {
-            return true;
-        }
-    }
-    false
 }

@@ -20,6 +20,7 @@ mod noise;
 mod overrides;
 mod plane;
 pub mod published;
+mod rims;
 mod space;
 
 use crate::{Method, Parameters, SmoothingError};

@@ -21,10 +21,11 @@ const HIGHEST_STEP: f64 = 1.5;
 const OUTLIER: f64 = 5.0 * 1.4826;
 
 /// Share of the bends of the edges inside, by angle and length, that the curvature of a smooth surface explains, from which on a face is
-/// part of one: on a torus nearly all, on a flat face with white noise about the root of two over their number.
+/// part of one. On a torus it is nearly all. Of flat pieces of a regular mesh with white heights, 8,000 of each size, those with 21 edges
+/// have 0.18 on the mean and one was above, with 65 edges 0.07 and none.
 const SMOOTH_BENDS: f64 = 0.7;
 
-/// With fewer edges than this noise comes to that share by chance more often than once in a thousand.
+/// With fewer edges than this the share says too little.
 const FEWEST_BENDS: usize = 24;
 
 /// A flat patch that was found.
