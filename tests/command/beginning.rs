@@ -22,7 +22,7 @@ fn a_new_pipeline_is_a_good_one() {
             ended.stdout
         );
     }
-    assert!(shop.read("fresh.toml").contains("\nuntangle = true "));
+    assert!(shop.read("fresh.toml").contains("\n# untangle = false "));
     assert_eq!(shop.topipe(&["plan", "fresh.toml"]).code, 0);
     let again = shop.topipe(&["new", "box.off", "-o", "fresh.toml"]);
     assert_eq!(again.code, 2);

@@ -9,11 +9,6 @@ use topipe_mesh::DVec3;
 /// Samples within this distance, in parameters, show how the mesh is turned somewhere: a third of a span of eight.
 const NEAR: f64 = 0.04;
 
-/// Where a normal makes this angle with those at the corners, 37 degrees, or a larger one, a patch may be turned over between the points
-/// of the grid, with the knots that are inserted afterwards, or pass through a slender one beside it: the cosine. With 53 and with 73
-/// degrees one of the places of the bridge was not found, without these knots.
-const NEARLY: f64 = 0.8;
-
 impl Net {
     /// The share of points, on a grid of about four points a span that includes the sides, where the patch is turned
     /// over: its normal points away from the normals at the corners, blended, and from that of the mesh there, which may
@@ -30,23 +25,16 @@ impl Net {
         mut cell: impl FnMut([usize; 2]),
     ) -> f64 {
         let mut folded = 0;
-        self.any_normal(corners, |at, place, normal| {
+        self.each_normal(corners, |at, place, normal| {
             let over = normal.dot(blended(corners, place)) <= 0.0
                 && !samples.near(place, NEAR).any(|sample| normal.dot(sample.normal) > 0.0);
             if over {
                 folded += 1;
                 cell(at);
             }
-            false
         });
         let [nu, nv] = self.grid();
         folded as f64 / ((nu + 1) * (nv + 1)) as f64
-    }
-
-    /// Whether the normal points away from those at the corners, blended, at one of these points, or nearly does in a cell that is not
-    /// known to be turned over nowhere.
-    pub(crate) fn nearly_folds(&self, corners: &[DVec3; 4]) -> bool {
-        self.any_normal(corners, |_, place, normal| normal.dot(blended(corners, place)) <= NEARLY)
     }
 
     /// Steps of the grid.
@@ -54,13 +42,9 @@ impl Net {
         [2 * self.basis_u.len(), 2 * self.basis_v.len()]
     }
 
-    /// Whether something holds at a point of the grid, given its cell of the net, its parameters and the normal there. Cells that
-    /// cannot fold are passed over.
-    fn any_normal(
-        &self,
-        corners: &[DVec3; 4],
-        mut holds: impl FnMut([usize; 2], [f64; 2], DVec3) -> bool,
-    ) -> bool {
+    /// Hands each point of the grid to `visit`: its cell of the net, its parameters and the normal there. Cells that cannot fold are
+    /// passed over.
+    fn each_normal(&self, corners: &[DVec3; 4], mut visit: impl FnMut([usize; 2], [f64; 2], DVec3)) {
         let [nu, nv] = self.grid();
         let spans = [self.basis_u.len() / 2 - 1, self.basis_v.len() / 2 - 1];
         let columns: Vec<_> =
@@ -82,12 +66,9 @@ impl Net {
                 };
                 let functions = ([column[0], row[1]], both(values_u, values_v), both(slopes_u, slopes_v));
                 let place = [i as f64 / nu as f64, j as f64 / nv as f64];
-                if holds(cell, place, self.combine(functions).normal()) {
-                    return true;
-                }
+                visit(cell, place, self.combine(functions).normal());
             }
         }
-        false
     }
 
     /// True only where the patch is nowhere in a cell of its net turned over against the normals at its corners, blended. Its
@@ -166,7 +147,6 @@ mod tests {
         let share = back.folded(&[DVec3::Z; 4], &samples(DVec3::Z));
         // The derivative 1 - 1.2 (1 - 2 u) is negative below u = 1/12.
         assert!((0.04..0.15).contains(&share), "{share}");
-        assert!(!flat.nearly_folds(&[DVec3::Z; 4]) && back.nearly_folds(&[DVec3::Z; 4]));
     }
 
     proptest! {

@@ -38,7 +38,7 @@ pub struct Parameters {
     /// layout.
     pub divisions: u32,
     /// Whether patches are divided in these rounds also where they pass through themselves or each other, triangulated to 5e-4 of the
-    /// diagonal. Each trial takes some tenths of the time of the fit.
+    /// diagonal. Without it the fit is faster: on the bracket by a third.
     pub untangle: bool,
     /// Largest angle between the normals of two patches along an edge that is no feature, degrees; knots are inserted
     /// where it is exceeded, down to spans of 1/32768 of an edge, in patches of bounded size.
@@ -89,7 +89,7 @@ impl Default for Parameters {
             tolerance: 2e-3,
             tolerance_mm: None,
             divisions: DEFAULT_DIVISIONS,
-            untangle: false,
+            untangle: true,
             max_normal_jump: 0.1,
             degree: 3,
             interior_knots: vec![1.0 / 3.0, 2.0 / 3.0],

@@ -190,15 +190,20 @@ impl<'a> Fit<'a> {
         patches.is_some_and(|(own, other)| Arc::ptr_eq(own, other))
     }
 
-    /// Whether a patch is nearly turned over somewhere.
-    pub(crate) fn nearly_folds(&self, quad: usize) -> bool {
-        let fitted = &self.round.fitted[quad];
-        fitted.net.nearly_folds(&fitted.corners)
-    }
-
     /// A box around a patch, that of its control points.
     pub(crate) fn patch_box(&self, quad: usize) -> [DVec3; 2] {
         extent(self.knots.nets[quad].control.iter().copied())
+    }
+
+    /// The patches of certain quads, and all faces of known shape.
+    fn surface_of(&self, quads: &[u32]) -> SplineSurface {
+        let nets = quads.iter().map(|&quad| (quad as usize, Net::clone(&self.knots.nets[quad as usize])));
+        assemble(&self.setting, &self.round.network, nets)
+    }
+
+    /// The patches of certain quads.
+    pub(crate) fn patches_of(&self, quads: &[u32]) -> SplineSurface {
+        SplineSurface { faces: Vec::new(), ..self.surface_of(quads) }
     }
 
     /// The part of the surface that may be in certain boxes, and the quads of its patches.
@@ -208,8 +213,7 @@ impl<'a> Fit<'a> {
         let nets = &self.knots.nets;
         let quads = (0..nets.len() as u32).into_par_iter();
         let quads: Vec<u32> = quads.filter(|&quad| is_in(self.patch_box(quad as usize))).collect();
-        let nets = quads.iter().map(|&quad| (quad as usize, Net::clone(&nets[quad as usize])));
-        let mut surface = assemble(&self.setting, &self.round.network, nets);
+        let mut surface = self.surface_of(&quads);
         let edges = &surface.edges;
         surface.faces.retain(|face| {
             let sides = face.loops.iter().flatten();

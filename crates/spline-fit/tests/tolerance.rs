@@ -115,17 +115,16 @@ fn crossed(layout: &QuadLayout, surface: &SplineSurface) -> usize {
 }
 
 #[test]
-fn patches_are_untangled_on_demand() {
+fn patches_are_untangled_unless_told_otherwise() {
     let layout = fixture("monster-lite");
-    let tangled = fitted(&layout, &Parameters::default()).0;
+    let tangled = fitted(&layout, &Parameters { untangle: false, ..Default::default() }).0;
     assert_eq!(tangled.patches.len(), layout.quads.len());
     assert!(crossed(&layout, &tangled) > 0);
     let remarks = Arc::new(Remarks::default());
     let progress = Progress::new(remarks.clone());
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let parameters = Parameters { untangle: true, ..Default::default() };
-        pool.install(|| fit(&layout, &parameters, &Units::none(), &progress).unwrap())
+        pool.install(|| fit(&layout, &Parameters::default(), &Units::none(), &progress).unwrap())
     };
     let surface = on(1);
     let remarks = std::mem::take(&mut *remarks.0.lock().unwrap());

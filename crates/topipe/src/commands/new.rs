@@ -287,7 +287,7 @@ input = "tiles"
 [stage.surface]
 kind = "spline-fit"
 input = "quads"
-untangle = true                     # divides patches that pass through each other; without it the fit is faster
+# untangle = false                  # faster: patches that pass through each other are not divided
 # tolerance = 1e-3                  # 0.1 % of the diagonal: nearer to the mesh, more patches
 {frame}{about}
 [stage.check]                       # measures all of it: report.json, report.html
