@@ -4,7 +4,7 @@
 //! back on each other. So triangles that pass through each other are looked for around those that stand across the rest of their patch: a
 //! few boxes instead of the whole surface. Not found are crossings of parts of the surface that have nothing else to do with each other.
 
-use crate::surface::extent;
+use crate::surface::{boxes_meet, extent};
 use crate::tangent_fit::Fit;
 use std::collections::BTreeMap;
 use topipe_mesh::spatial::crossings;
@@ -81,21 +81,17 @@ fn across(fit: &Fit<'_>, quads: &[u32]) -> Vec<[DVec3; 2]> {
     }
     let patches = fit.patches_of(quads);
     let (mesh, patch_of_triangle) = patches.tessellate_with(chord(fit), f64::INFINITY);
-    let triangles = || mesh.triangles.iter().zip(&patch_of_triangle).map(|(t, &patch)| (t, patch as usize));
-    let area = |t: &[VertexId; 3]| {
-        let [a, b, c] = t.map(|v| mesh.position(v));
-        (b - a).cross(c - a)
-    };
+    let triangles = || mesh.faces().zip(&patch_of_triangle).map(|(f, &patch)| (f, patch as usize));
     let mut normals = vec![DVec3::ZERO; patches.patches.len()];
-    triangles().for_each(|(t, patch)| normals[patch] += area(t));
+    triangles().for_each(|(f, patch)| normals[patch] += mesh.area_vector(f));
     normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
     let mut boxes: Vec<Option<[DVec3; 2]>> = vec![None; normals.len()];
-    for (t, patch) in triangles().filter(|(t, patch)| {
-        let own = area(t);
-        own.dot(normals[*patch]) < ACROSS * own.length()
-    }) {
-        let known = boxes[patch].into_iter().flatten();
-        boxes[patch] = Some(extent(t.iter().map(|v| mesh.position(*v)).chain(known)));
+    for (f, patch) in triangles() {
+        let area = mesh.area_vector(f);
+        if area.dot(normals[patch]) < ACROSS * area.length() {
+            let known = boxes[patch].into_iter().flatten();
+            boxes[patch] = Some(extent(mesh.corners(f).into_iter().chain(known)));
+        }
     }
     let widened = |[low, high]: [DVec3; 2]| {
         let by = DVec3::splat(WIDENED * (high - low).max_element());
@@ -107,11 +103,6 @@ fn across(fit: &Fit<'_>, quads: &[u32]) -> Vec<[DVec3; 2]> {
 /// The chord tolerance, mm.
 fn chord(fit: &Fit<'_>) -> f64 {
     CHORD * fit.setting.layout.part.mesh.diagonal()
-}
-
-/// Whether two boxes have a point in common.
-fn meet([low, high]: &[DVec3; 2], [other_low, other_high]: &[DVec3; 2]) -> bool {
-    low.cmple(*other_high).all() && high.cmpge(*other_low).all()
 }
 
 /// Where triangles of the surface of a fit that reach into certain boxes pass through each other, and their patches, the smaller first.
@@ -130,8 +121,9 @@ fn crossings_in(fit: &Fit<'_>, boxes: &[[DVec3; 2]]) -> Vec<(Vec<u32>, DVec3)> {
     }
     // Most triangles are far from all boxes, and so is their face from most.
     let near: Vec<Vec<&[DVec3; 2]>> =
-        faces.iter().map(|face| boxes.iter().filter(|b| meet(face, b)).collect()).collect();
-    let reach = |(t, face): &([VertexId; 3], u32)| near[*face as usize].iter().any(|b| meet(&around(t), b));
+        faces.iter().map(|face| boxes.iter().filter(|b| boxes_meet(face, b)).collect()).collect();
+    let reach =
+        |(t, face): &([VertexId; 3], u32)| near[*face as usize].iter().any(|b| boxes_meet(&around(t), b));
     let (triangles, face_of_triangle): (Vec<_>, Vec<u32>) =
         triangles.into_iter().zip(face_of_triangle).filter(reach).unzip();
     let mesh = TriangleMesh { positions, triangles };

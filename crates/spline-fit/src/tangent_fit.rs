@@ -22,7 +22,7 @@ use crate::refinement::Refinement;
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
 use crate::simplify::simplify;
-use crate::surface::extent;
+use crate::surface::{boxes_meet, extent};
 use crate::unit::key_of;
 use crate::{CurveShape, EdgeCurve, Parameters, Patch, PatchSide, SplineFitError, SplineSurface};
 use rayon::prelude::*;
@@ -208,8 +208,7 @@ impl<'a> Fit<'a> {
 
     /// The part of the surface that may be in certain boxes, and the quads of its patches.
     pub(crate) fn surface_in(&self, boxes: &[[DVec3; 2]]) -> (SplineSurface, Vec<u32>) {
-        let is_in =
-            |[low, high]: [DVec3; 2]| boxes.iter().any(|[l, h]| low.cmple(*h).all() && high.cmpge(*l).all());
+        let is_in = |own: [DVec3; 2]| boxes.iter().any(|other| boxes_meet(&own, other));
         let nets = &self.knots.nets;
         let quads = (0..nets.len() as u32).into_par_iter();
         let quads: Vec<u32> = quads.filter(|&quad| is_in(self.patch_box(quad as usize))).collect();
