@@ -146,7 +146,7 @@ fn text(fit: &Fit<'_>, given: Given<'_>) -> String {
         ));
     }
     let crossed = fit.crossed.first().filter(|_| given.parameters.untangle);
-    if let Some(at) = crossed.and_then(|crossed| crossed.points.first()) {
+    if let Some(at) = crossed.and_then(|crossed| crossed.places.first()).map(|place| place.point) {
         let places = places(fit.crossed.len());
         texts.push(format!(
             "patches pass through themselves or each other {places}, one at ({:.3}, {:.3}, {:.3})",

@@ -3,6 +3,7 @@
 //! Each edge curve is divided once, and both of its faces use those points. Inside, a patch has a grid of its own;
 //! a strip of triangles joins the grid to the four sides. A face of known shape is triangulated between its borders.
 
+pub(crate) mod across;
 mod trimmed;
 
 use crate::surface::Column;
@@ -52,12 +53,25 @@ fn widest(radius: f64, tolerance: f64) -> f64 {
 /// How often the borders of a face are sampled four times more finely when they cross because they are sampled too coarsely.
 const REFINEMENTS: u32 = 4;
 
+/// How often triangles that pass through each other are looked at: each time but the last their patches are sampled four times more finely.
+/// What has not come apart then passes through itself, and is sampled as it was.
+const PARTINGS: u32 = 3;
+
+/// How near triangles come to a surface, mm.
+struct Tolerances {
+    patches: Vec<f64>,
+    /// Of the borders of analytic faces, by edge; sides of patches are as near as these.
+    borders: Vec<f64>,
+    faces: f64,
+}
+
 impl SplineSurface {
     /// Triangles whose distance from the surface is about `chord_tolerance` (mm) at the most.
     ///
     /// Guarantees: a closed surface gives a closed mesh, oriented alike, with shared vertices. The tolerance is an
-    /// estimate from the control points; at most 256 divisions are made per patch side. Where the borders of a face
-    /// would cross each other, they are sampled more finely; a face whose borders cross however finely they are
+    /// estimate from the control points; at most 256 divisions are made per patch side. Where triangles of narrow patches that turn
+    /// would pass through each other, these patches are divided more finely; where the surface itself does, they still do. Where the
+    /// borders of a face would cross each other, they are sampled more finely; a face whose borders cross however finely they are
     /// sampled is left out, and the mesh is open there.
     pub fn tessellate(&self, chord_tolerance: f64) -> TriangleMesh {
         self.tessellate_with(chord_tolerance, f64::INFINITY).0
@@ -66,57 +80,97 @@ impl SplineSurface {
     /// The same, with no edge inside an analytic face longer than `longest` (mm), and the face of each triangle:
     /// patches first, then analytic faces.
     pub fn tessellate_with(&self, chord_tolerance: f64, longest: f64) -> (TriangleMesh, Vec<u32>) {
-        self.refined(chord_tolerance, longest, true)
+        self.refined(chord_tolerance, longest, true, PARTINGS)
     }
 
     /// The triangles of the analytic faces alone, and the analytic face of each.
     pub fn tessellate_faces(&self, chord_tolerance: f64, longest: f64) -> (TriangleMesh, Vec<u32>) {
-        let (mesh, mut faces) = self.refined(chord_tolerance, longest, false);
+        let (mesh, mut faces) = self.refined(chord_tolerance, longest, false, 0);
         faces.iter_mut().for_each(|face| *face -= self.patches.len() as u32);
         (mesh, faces)
     }
 
-    fn refined(&self, chord_tolerance: f64, longest: f64, patches: bool) -> (TriangleMesh, Vec<u32>) {
-        let tolerance = if chord_tolerance > 0.0 { chord_tolerance } else { f64::MIN_POSITIVE };
-        // Only the borders of a face that needs it are sampled more finely: where all were, one such face made a billion
-        // bytes of the bell crank's STL.
-        let mut tolerances = vec![tolerance; self.edges.len()];
-        for _ in 0..REFINEMENTS {
-            let (mesh, face_of_triangle, crossing) = self.triangles(tolerance, &tolerances, longest, patches);
-            if crossing.is_empty() {
-                return (mesh, face_of_triangle);
-            }
-            let mut edges: Vec<u32> = crossing
-                .iter()
-                .flat_map(|&face| self.faces[face].loops.iter().flatten().map(|side| side.edge))
-                .collect();
-            edges.sort_unstable();
-            edges.dedup();
-            edges.into_iter().for_each(|edge| tolerances[edge as usize] /= 4.0);
-        }
-        let (mesh, face_of_triangle, _) = self.triangles(tolerance, &tolerances, longest, patches);
-        (mesh, face_of_triangle)
+    /// Triangles as they are, also where they pass through each other, and the face of each.
+    pub(crate) fn triangulate(&self, chord_tolerance: f64) -> (TriangleMesh, Vec<u32>) {
+        self.refined(chord_tolerance, f64::INFINITY, true, 0)
     }
 
-    /// With a tolerance for each edge. Also returns the analytic faces whose borders cross.
+    fn refined(
+        &self,
+        chord_tolerance: f64,
+        longest: f64,
+        patches: bool,
+        partings: u32,
+    ) -> (TriangleMesh, Vec<u32>) {
+        let tolerance = if chord_tolerance > 0.0 { chord_tolerance } else { f64::MIN_POSITIVE };
+        let mut tolerances = Tolerances {
+            patches: vec![tolerance; self.patches.len()],
+            borders: vec![tolerance; self.edges.len()],
+            faces: tolerance,
+        };
+        // Only what needs it is sampled more finely: where all borders were, one such face made a billion bytes of the bell crank's STL.
+        let (mut refinements, mut partings) = (REFINEMENTS, partings);
+        loop {
+            let (mesh, face_of_triangle, crossing) = self.triangles(&tolerances, longest, patches);
+            if refinements > 0 && !crossing.is_empty() {
+                refinements -= 1;
+                let loops = crossing.iter().flat_map(|&face| &self.faces[face].loops);
+                let mut edges: Vec<u32> = loops.flatten().map(|side| side.edge).collect();
+                edges.sort_unstable();
+                edges.dedup();
+                edges.into_iter().for_each(|edge| tolerances.borders[edge as usize] /= 4.0);
+                continue;
+            }
+            let crossed = match partings {
+                0 => Vec::new(),
+                _ => self.patches_that_cross(&mesh, &face_of_triangle),
+            };
+            if crossed.is_empty() {
+                return (mesh, face_of_triangle);
+            }
+            // What still crosses in the end does so however fine it is.
+            partings -= 1;
+            let finer = |own: f64| if partings > 0 { own / 4.0 } else { tolerance };
+            crossed
+                .into_iter()
+                .for_each(|patch| tolerances.patches[patch] = finer(tolerances.patches[patch]));
+        }
+    }
+
+    /// The patches with triangles that pass through others.
+    fn patches_that_cross(&self, mesh: &TriangleMesh, face_of_triangle: &[u32]) -> Vec<usize> {
+        let patches = self.patches.len();
+        let boxes = across::across(mesh, face_of_triangle, patches);
+        let found = across::crossings_in(mesh, face_of_triangle, &boxes);
+        let faces = found.iter().flat_map(|crossing| crossing.faces);
+        let mut crossed: Vec<usize> = faces.map(|f| face_of_triangle[f.index()] as usize).collect();
+        crossed.sort_unstable();
+        crossed.dedup();
+        crossed.retain(|&face| face < patches);
+        crossed
+    }
+
+    /// Also returns the analytic faces whose borders cross.
     fn triangles(
         &self,
-        tolerance: f64,
-        tolerances: &[f64],
+        tolerances: &Tolerances,
         longest: f64,
         patches: bool,
     ) -> (TriangleMesh, Vec<u32>, Vec<usize>) {
         let mut mesh = TriangleMesh { positions: self.vertices.clone(), triangles: Vec::new() };
-        // Of a part of a surface only the edges that it has.
-        let mut used = vec![false; self.edges.len()];
+        // Of a part of a surface only the edges that it has, each as near as the nearer of its two faces.
+        let mut nearness = vec![f64::INFINITY; self.edges.len()];
+        let of_patches = self.patches.iter().zip(&tolerances.patches);
+        let of_patches =
+            of_patches.flat_map(|(patch, &tolerance)| patch.sides.iter().map(move |side| (side, tolerance)));
         let of_faces = self.faces.iter().flat_map(|face| face.loops.iter().flatten());
-        let sides = self.patches.iter().flat_map(|patch| &patch.sides).chain(of_faces);
-        for side in sides {
-            used.get_mut(side.edge as usize).into_iter().for_each(|used| *used = true);
+        let of_faces = of_faces.filter_map(|side| Some((side, *tolerances.borders.get(side.edge as usize)?)));
+        for (side, tolerance) in of_patches.chain(of_faces) {
+            nearness.get_mut(side.edge as usize).into_iter().for_each(|own| *own = own.min(tolerance));
         }
         let inner = |e: usize| -> Vec<DVec3> {
             let edge = &self.edges[e];
-            let count = if used[e] { edge_divisions(edge, tolerances[e]) } else { 1 };
+            let count = if nearness[e].is_finite() { edge_divisions(edge, nearness[e]) } else { 1 };
             (1..count).map(|k| edge.exact(k as f64 / count as f64).position).collect()
         };
         let inner: Vec<Vec<DVec3>> = (0..self.edges.len()).into_par_iter().map(inner).collect();
@@ -142,7 +196,7 @@ impl SplineSurface {
         };
         let mut face_of_triangle = Vec::new();
         let patches = if patches { &self.patches[..] } else { &[] };
-        let grids = patches.par_iter().map(|patch| {
+        let grids = patches.par_iter().zip(&tolerances.patches).map(|(patch, &tolerance)| {
             let sides: Vec<Vec<VertexId>> = patch.sides.iter().map(along).collect();
             let size = grid_size(patch, &sides, tolerance);
             (grid(patch, size), sides, size)
@@ -183,7 +237,7 @@ impl SplineSurface {
                 .collect();
             let angle = match face.shape {
                 RegionShape::Plane { .. } => f64::INFINITY,
-                RegionShape::Cylinder { radius, .. } => widest(radius, tolerance),
+                RegionShape::Cylinder { radius, .. } => widest(radius, tolerances.faces),
             };
             if !trimmed::add(&mut mesh, &face.shape, &loops, angle, longest) {
                 crossing.push(f);
