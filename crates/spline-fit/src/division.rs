@@ -66,14 +66,12 @@ fn improved(
             }
         }
     }
-    let what = text(&fit, given);
-    if fit.beyond.is_empty() {
-        progress.remark(&format!("{what}: dividing brings nothing more"));
-    } else {
-        progress.warn(&format!(
-            "{what}: dividing patches brings nothing more; smaller tiles (`tile_size`), a finer mesh or a wider `tolerance` may"
-        ));
-    }
+    // Whoever shells or meshes the solid wants to know of the one as of the other.
+    let remedy = match fit.beyond.is_empty() {
+        true => "smaller tiles (`tile_size`) or a finer mesh may",
+        false => "smaller tiles (`tile_size`), a finer mesh or a wider `tolerance` may",
+    };
+    progress.warn(&format!("{}: dividing patches brings nothing more; {remedy}", text(&fit, given)));
     Ok(fit.surface(given.parameters))
 }
 
