@@ -209,7 +209,7 @@ fn in_order(mut suspects: Vec<Suspect>) -> Vec<Suspect> {
     suspects
 }
 
-/// Patches whose samples are nearer than this share of the limit do not swing out beside them. Those that were drawn to samples are at 0.5
+/// Patches whose samples are all nearer than this share of the limit are taken not to swing out beside them. Those that were drawn to samples are at 0.5
 /// and above, see [`crate::Parameters::tolerance`]; of the bell crank with tiles of 127.5 degrees one that was not swings 2 % beyond the
 /// limit, and is found with 0.25, 0.1 and 0. The fits of bracket and bridge take the same time with all four.
 const NEAR: f64 = 0.1;

@@ -7,9 +7,9 @@ use topipe_mesh::DVec3;
 
 /// How long the surface may pass through itself for each place that is not beyond the tolerance any more, over the diagonal. A place that
 /// is beyond it by a little does less harm than a solid that cannot be meshed: gmsh made no volume of beam-two-holes when one place, a few
-/// percent beyond, was done away with and 38 pairs of triangles, of 5e-4 of the diagonal, crossed (4 did before). With a
-/// tolerance of 1e-3 the bracket comes to 1.5e-3 with 1.5e-3 here and less, and to it with 2e-3 and more; 7 pairs of triangles of its STL
-/// cross with 2e-3 and 2.5e-3, 103 with 3e-3. Support and monster-lite are the same with all of these.
+/// percent beyond, was done away with and 38 pairs of triangles, of 5e-4 of the diagonal, crossed (4 did before). With a tolerance of 1e-3
+/// the bracket comes to 1.5e-3 with 1.5e-3 here and less, and to 1e-3 with 2e-3 and more; 7 pairs of triangles of its STL cross with 2e-3 and
+/// 2.5e-3, 103 with 3e-3. Support and monster-lite come to the same deviation with all of these.
 const LENGTH: f64 = 2e-3;
 
 /// What of a fit lies nearest to a vertex.
