@@ -11,9 +11,9 @@ use glam::DVec3;
 /// All functions that take a mesh want the one that this belongs to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HalfEdges {
-    twin: Vec<HalfEdgeId>,
+    pub(crate) twin: Vec<HalfEdgeId>,
     /// The first one counter-clockwise, where the vertex lies on the border.
-    outgoing: Vec<HalfEdgeId>,
+    pub(crate) outgoing: Vec<HalfEdgeId>,
 }
 
 /// What a split made: the new vertex, and each new face with the face it was cut from.
@@ -99,7 +99,7 @@ impl HalfEdges {
         face
     }
 
-    fn pair(&mut self, g: HalfEdgeId, h: HalfEdgeId) {
+    pub(crate) fn pair(&mut self, g: HalfEdgeId, h: HalfEdgeId) {
         if g.is_some() {
             self.twin[g.index()] = h;
         }

@@ -12,10 +12,13 @@ mod connectivity;
 mod csr;
 mod curvature;
 pub mod disk_map;
+mod edge_changes;
+pub mod fit;
 pub mod half_edges;
 mod ids;
 pub mod import;
 pub mod measures;
+mod meet;
 pub mod part;
 pub mod refine;
 pub mod spatial;
@@ -25,6 +28,7 @@ pub mod write;
 pub use connectivity::{Connectivity, ConnectivityError};
 pub use glam::{DMat3, DVec3};
 pub use ids::{FaceId, HalfEdgeId, RegionId, VertexId};
+pub use meet::meet;
 pub use part::{
     Design, FeatureEdge, FeatureKind, ImportRecord, Part, Provenance, Region, RegionShape, Repair,
     SmoothingRecord,

@@ -15,10 +15,12 @@ pub(crate) mod crossing;
 mod outline;
 pub(crate) mod sharpness;
 mod smoothing_curve;
+mod tangency;
+
+use tangency::PlaneBeside;
 
 use crate::{AnalyticFace, EdgeCurve, PatchSide, SplineFitError};
-use glam::DMat3;
-use topipe_mesh::{Connectivity, DVec3, RegionId, RegionShape, TriangleMesh};
+use topipe_mesh::{Connectivity, DVec3, RegionId, RegionShape, TriangleMesh, meet};
 use topipe_quad_matching::QuadLayout;
 
 /// Curves stay within this share of the part's diagonal of the shapes they lie on: 1e-7 mm on a part of 200 mm.
@@ -154,7 +156,7 @@ fn sides(layout: &QuadLayout) -> Result<Vec<Beside>, SplineFitError> {
 }
 
 /// The shapes of the regions, with the axis of a cylinder turned into the normal of a plane beside it where the mesh
-/// can not tell the two directions apart: their intersection then is a circle.
+/// can not tell the two directions apart: their intersection then is a circle. In the same way cylinders are made tangent to planes.
 fn shapes(layout: &QuadLayout, sides: &[Beside], tolerance: f64) -> Vec<RegionShape> {
     let regions = &layout.part.regions;
     let mut shapes: Vec<RegionShape> = regions.iter().map(|r| r.shape).collect();
@@ -190,6 +192,24 @@ fn shapes(layout: &QuadLayout, sides: &[Beside], tolerance: f64) -> Vec<RegionSh
             }
         }
     }
+    let mut planes: Vec<Vec<(RegionId, PlaneBeside)>> = vec![Vec::new(); regions.len()];
+    for beside in sides {
+        let [Some(a), Some(b)] = *beside else { continue };
+        for (c, p) in [(a, b), (b, a)] {
+            let known = planes[c.index()].iter().any(|(region, _)| *region == p);
+            if let (RegionShape::Plane { point, normal }, false) = (regions[p.index()].shape, known) {
+                let unseen = (regions[c.index()].residual + regions[p.index()].residual).max(tolerance);
+                planes[c.index()].push((p, PlaneBeside { point, normal, unseen }));
+            }
+        }
+    }
+    for (c, mut planes) in planes.into_iter().enumerate() {
+        planes.sort_by_key(|(region, _)| *region);
+        let planes: Vec<PlaneBeside> = planes.into_iter().map(|(_, plane)| plane).collect();
+        if let Some(touching) = tangency::tangent(&shapes[c], &planes, extent[c]) {
+            shapes[c] = touching;
+        }
+    }
     shapes
 }
 
@@ -215,37 +235,11 @@ fn vertices(layout: &QuadLayout, sides: &[Beside], shapes: &[RegionShape]) -> Ve
         .collect()
 }
 
-/// Small against the squared sine of any angle at which shapes are seen to meet, large against rounding.
-const DAMPING: f64 = 1e-8;
-const STEPS: usize = 30;
-
-/// A point on all of `shapes` near `start`, by damped Gauss-Newton steps of least length. Where the shapes do not meet
-/// there it is a point of least squares.
-pub(crate) fn meet(shapes: &[&RegionShape], start: DVec3) -> DVec3 {
-    if let [shape] = shapes {
-        return shape.project(start);
-    }
-    let mut p = start;
-    for _ in 0..STEPS {
-        let (mut matrix, mut right) = (DMat3::from_diagonal(DVec3::splat(DAMPING)), DVec3::ZERO);
-        for shape in shapes {
-            let (n, d) = (shape.normal(p), shape.distance(p));
-            matrix += DMat3::from_cols(n * n.x, n * n.y, n * n.z);
-            right -= n * d;
-        }
-        let step = matrix.inverse() * right;
-        if !step.is_finite() || step.length() <= f64::EPSILON * (p.length() + 1e-3 * step.length()) {
-            break;
-        }
-        p += step;
-    }
-    p
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::CurveShape;
+    use glam::DMat3;
     use std::f64::consts::TAU;
     use topipe_mesh::{Part, Region, VertexId};
     use topipe_quad_matching::{MacroEdge, RegionFace, Side};

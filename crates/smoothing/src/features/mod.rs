@@ -15,7 +15,6 @@ mod chains;
 mod cylinder;
 mod edge_overrides;
 mod edges;
-mod fit;
 mod noise;
 mod overrides;
 mod plane;
@@ -25,7 +24,7 @@ mod space;
 
 use crate::{Method, Parameters, SmoothingError};
 use topipe_mesh::{
-    Connectivity, DVec3, FaceId, HalfEdgeId, Part, Region, RegionId, RegionShape, TriangleMesh,
+    Connectivity, DVec3, FaceId, HalfEdgeId, Part, Region, RegionId, RegionShape, TriangleMesh, fit,
 };
 use topipe_progress::Progress;
 

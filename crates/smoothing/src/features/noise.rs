@@ -116,7 +116,7 @@ pub(super) fn is_systematic(
     if count < 9.0 * TERMS as f64 {
         return false;
     }
-    let c = super::fit::solve(m.map(|row| row.map(|e| e / count)), b.map(|e| e / count));
+    let c = topipe_mesh::fit::solve(m.map(|row| row.map(|e| e / count)), b.map(|e| e / count));
     let explained = c.map_or(0.0, |c| c.iter().zip(b).map(|(c, b)| c * b).sum::<f64>());
     explained > EXPLAINED * square
 }

@@ -3,7 +3,7 @@
 use super::borders::NONE;
 use super::noise::Tolerance;
 use super::space::{self, Space};
-use super::{cylinder, distance, fit};
+use super::{cylinder, distance};
 use crate::SmoothingError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -253,7 +253,7 @@ fn add(
         .chain(inside.iter().step_by(stride).map(|&f| patch(connectivity, inside, f)));
     for faces in patches {
         if matches!(entry.shape, Shape::Any | Shape::Plane)
-            && let Some((point, normal)) = fit::plane(mesh, &faces)
+            && let Some((point, normal)) = topipe_mesh::fit::plane(mesh, &faces)
         {
             consider(RegionShape::Plane { point, normal });
         }

@@ -1,7 +1,6 @@
 //! Flat faces by region growing.
 
 use super::border_half_edges;
-use super::fit;
 use super::noise::{Tolerance, is_systematic};
 use topipe_mesh::{Connectivity, DVec3, FaceId, HalfEdgeId, RegionShape, TriangleMesh};
 use topipe_progress::{Interrupted, Progress};
@@ -255,7 +254,7 @@ impl Search<'_> {
     }
 
     fn fit(&self, faces: &[FaceId]) -> Option<Plane> {
-        fit::plane(self.mesh, faces).map(|(point, normal)| Plane { point, normal })
+        topipe_mesh::fit::plane(self.mesh, faces).map(|(point, normal)| Plane { point, normal })
     }
 
     /// True when most of the border is the edge of a step, as around each layer of a voxel mesh. Its own flat faces

@@ -130,7 +130,7 @@ fn general(a: &RegionShape, b: &RegionShape, path: &[DVec3], tolerance: f64) -> 
     let at = |t: f64| {
         let k = along.partition_point(|&s| s <= t).clamp(1, last) - 1;
         let x = (t - along[k]) / (along[k + 1] - along[k]);
-        super::meet(&[a, b], path[k].lerp(path[k + 1], if x.is_finite() { x } else { 0.0 }))
+        topipe_mesh::meet(&[a, b], path[k].lerp(path[k + 1], if x.is_finite() { x } else { 0.0 }))
     };
     let mut spans = 1;
     while spans <= MOST_SPANS {

@@ -1,14 +1,15 @@
-//! Small dense fits: eigenvectors of symmetric 3 x 3 matrices, circles, cylinders.
+//! Small dense fits: eigenvectors of symmetric 3 x 3 matrices, planes, circles, cylinders.
 
-use topipe_mesh::{DVec3, FaceId, TriangleMesh};
+use crate::{FaceId, TriangleMesh};
+use glam::DVec3;
 
 /// A symmetric 3 x 3 matrix: xx, yy, zz, xy, xz, yz.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Symmetric([f64; 6]);
+pub struct Symmetric([f64; 6]);
 
 impl Symmetric {
     /// Adds `weight v v^T`.
-    pub(super) fn add(&mut self, v: DVec3, weight: f64) {
+    pub fn add(&mut self, v: DVec3, weight: f64) {
         let w = v * weight;
         let m = &mut self.0;
         m[0] += w.x * v.x;
@@ -20,7 +21,7 @@ impl Symmetric {
     }
 
     /// Eigenvalues in rising order with unit eigenvectors, by Jacobi rotations.
-    pub(super) fn eigen(&self) -> ([f64; 3], [DVec3; 3]) {
+    pub fn eigen(&self) -> ([f64; 3], [DVec3; 3]) {
         let [xx, yy, zz, xy, xz, yz] = self.0;
         let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
         let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -55,7 +56,7 @@ impl Symmetric {
 }
 
 /// Solves `m x = b` by elimination with pivoting; `None` when `m` is singular.
-pub(super) fn solve<const N: usize>(mut m: [[f64; N]; N], mut b: [f64; N]) -> Option<[f64; N]> {
+pub fn solve<const N: usize>(mut m: [[f64; N]; N], mut b: [f64; N]) -> Option<[f64; N]> {
     for k in 0..N {
         let pivot = (k..N).max_by(|&i, &j| m[i][k].abs().total_cmp(&m[j][k].abs()))?;
         if m[pivot][k].abs() < 1e-14 {
@@ -82,7 +83,7 @@ pub(super) fn solve<const N: usize>(mut m: [[f64; N]; N], mut b: [f64; N]) -> Op
 
 /// A point and the unit normal of the plane of least squares through faces: through their vertices, weighted by area.
 /// `None` for faces without area.
-pub(super) fn plane(mesh: &TriangleMesh, faces: &[FaceId]) -> Option<(DVec3, DVec3)> {
+pub fn plane(mesh: &TriangleMesh, faces: &[FaceId]) -> Option<(DVec3, DVec3)> {
     let (mut direction, mut point, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0);
     for &f in faces {
         let area = mesh.area_vector(f);
@@ -108,31 +109,34 @@ pub(super) fn plane(mesh: &TriangleMesh, faces: &[FaceId]) -> Option<(DVec3, DVe
 
 /// A circular cylinder without ends.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cylinder {
-    pub(super) point: DVec3,
-    pub(super) axis: DVec3,
-    pub(super) radius: f64,
+pub struct Cylinder {
+    /// A point of the axis.
+    pub point: DVec3,
+    /// Unit direction of the axis.
+    pub axis: DVec3,
+    /// In the unit of the points.
+    pub radius: f64,
 }
 
 impl Cylinder {
     /// From the axis to `p`, at a right angle to it.
-    pub(super) fn radial(&self, p: DVec3) -> DVec3 {
+    pub fn radial(&self, p: DVec3) -> DVec3 {
         let d = p - self.point;
         d - self.axis * self.axis.dot(d)
     }
 
     /// Signed distance of `p`, positive outside.
-    pub(super) fn distance(&self, p: DVec3) -> f64 {
+    pub fn distance(&self, p: DVec3) -> f64 {
         self.radial(p).length() - self.radius
     }
 
     /// Root mean square distance of `points`.
-    pub(super) fn misfit(&self, points: &[DVec3]) -> f64 {
+    pub fn misfit(&self, points: &[DVec3]) -> f64 {
         (points.iter().map(|&p| self.distance(p).powi(2)).sum::<f64>() / points.len() as f64).sqrt()
     }
 
     /// The cylinder along `axis` whose circle fits `points` best in the algebraic sense (Kåsa).
-    pub(super) fn along(axis: DVec3, points: &[DVec3]) -> Option<Self> {
+    pub fn along(axis: DVec3, points: &[DVec3]) -> Option<Self> {
         let (u, v) = axis.any_orthonormal_pair();
         let origin = points.iter().sum::<DVec3>() / points.len() as f64;
         let scale = points.iter().map(|p| p.distance(origin)).fold(0.0, f64::max);
@@ -173,12 +177,12 @@ impl Cylinder {
     }
 
     /// Least squares of the distances of `points` by at most `rounds` steps of Gauss-Newton, from here.
-    pub(super) fn refine(self, points: &[DVec3], rounds: usize) -> Option<Self> {
+    pub fn refine(self, points: &[DVec3], rounds: usize) -> Option<Self> {
         self.refine_to(points, rounds, 1e-14)
     }
 
     /// As [`Self::refine`], until a step is smaller than `precision`, in radii.
-    pub(super) fn refine_to(mut self, points: &[DVec3], rounds: usize, precision: f64) -> Option<Self> {
+    pub fn refine_to(mut self, points: &[DVec3], rounds: usize, precision: f64) -> Option<Self> {
         let n = points.len() as f64;
         let origin = points.iter().sum::<DVec3>() / n;
         // Where noise keeps the steps from getting as short as asked for, they soon come in circles of a few last bits; then
