@@ -5,7 +5,7 @@
 //! left; each round hands back at least one face, so it ends.
 
 use topipe_mesh::refine::Refiner;
-use topipe_mesh::{FaceId, HalfEdgeId, RegionId, VertexId};
+use topipe_mesh::{FaceId, HalfEdgeId, Region, RegionId, RegionShape, VertexId};
 
 /// Which regions are taken out.
 pub(crate) struct Choice {
@@ -132,9 +132,9 @@ fn keep_largest_component(refiner: &Refiner, region: &mut [RegionId], count: usi
 }
 
 /// Hands back faces that stick out of a region into surface that goes on smoothly: detection stops at faces, and its
-/// borders are ragged there. A true corner of a region has sharp edges.
+/// borders are ragged there. A true corner of a region has sharp edges, or the line in which a fillet touches a plane.
 fn cut_teeth(refiner: &Refiner, region: &mut [RegionId]) -> bool {
-    let mesh = &refiner.part().mesh;
+    let (mesh, regions) = (&refiner.part().mesh, &refiner.part().regions);
     let smooth = |h: HalfEdgeId| {
         let (m, n) = (mesh.area_vector(h.face()), mesh.area_vector(refiner.twin(h).face()));
         m.cross(n).length().atan2(m.dot(n)) < SMOOTH
@@ -146,9 +146,8 @@ fn cut_teeth(refiner: &Refiner, region: &mut [RegionId]) -> bool {
             continue;
         }
         let open = |k: usize| {
-            let h = HalfEdgeId::of(f, k);
-            let beyond = refiner.twin(h).face();
-            region[beyond.index()] != own
+            let beyond = region[refiner.twin(HalfEdgeId::of(f, k)).face().index()];
+            beyond != own && !(beyond.is_some() && touch(&regions[own.index()], &regions[beyond.index()]))
         };
         let tooth = (0..3).any(|k| {
             let (into, out) = (HalfEdgeId::of(f, (k + 2) % 3), HalfEdgeId::of(f, k));
@@ -166,6 +165,23 @@ fn cut_teeth(refiner: &Refiner, region: &mut [RegionId]) -> bool {
     }
     changed
 }
+
+/// Whether a cylinder is tangent to a plane: as far as their vertices tell, which lie nearer to both than this share of the radius.
+fn touch(a: &Region, b: &Region) -> bool {
+    let (plane, cylinder) = match a.shape {
+        RegionShape::Plane { .. } => (a.shape, b.shape),
+        RegionShape::Cylinder { .. } => (b.shape, a.shape),
+    };
+    let (RegionShape::Plane { point, normal }, RegionShape::Cylinder { point: center, axis, radius, .. }) =
+        (plane, cylinder)
+    else {
+        return false;
+    };
+    axis.dot(normal).abs() < TANGENT && (normal.dot(center - point).abs() - radius).abs() < TANGENT * radius
+}
+
+/// Small against all angles that are seen, large against what shapes are fitted with.
+const TANGENT: f64 = 1e-3;
 
 /// The surface goes on smoothly where it turns by less than this.
 const SMOOTH: f64 = 0.35; // 20 degrees
@@ -212,7 +228,7 @@ fn open_pinches(refiner: &Refiner, region: &mut [RegionId]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use topipe_mesh::{DVec3, Part, Region, RegionShape, TriangleMesh};
+    use topipe_mesh::{DVec3, Part, TriangleMesh};
 
     /// A box of 8 x 8 x 4 on a grid of unit squares; the top is a plane region but for the faces around one vertex,
     /// which lies `depth` below it. One more free face in the region where `hole`.
