@@ -11,9 +11,10 @@ use std::path::{Path, PathBuf};
 /// Stage, its crate, and the file of its adapter in `stages` and of its writers in `export`. Pictures, exchange formats and
 /// the report are no stages, they
 /// have a writer only.
-const PARTS: [(&str, &str, &str); 15] = [
+const PARTS: [(&str, &str, &str); 16] = [
     ("IMPORT", "mesh", "import.rs"),
     ("SIMP", "simp", "simp.rs"),
+    ("REMESHING", "remeshing", "remeshing.rs"),
     ("SMOOTHING", "smoothing", "smoothing.rs"),
     ("SMOOTHING_STUDY", "smoothing", "smoothing_study.rs"),
     ("TILING", "tiling", "tiling.rs"),

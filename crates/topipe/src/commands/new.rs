@@ -9,6 +9,7 @@ use topipe_engine::cache::write_atomically;
 use topipe_mesh::import::ImportOptions;
 use topipe_mesh::{Connectivity, Part, RegionShape};
 use topipe_progress::{Progress, number};
+use topipe_remeshing::Tessellation;
 
 /// Meshes up to so many triangles are smoothed once to see what is in them: about a second.
 const LOOKED_AT: usize = 150_000;
@@ -29,6 +30,8 @@ struct Looked {
     /// Of the bounding box.
     filled: f64,
     features: Features,
+    /// Why the mesh needs remeshing, and its triangles after it.
+    remeshed: Option<(Tessellation, usize)>,
     labels: Option<PathBuf>,
     format: String,
 }
@@ -83,6 +86,8 @@ fn look_at(mesh: &Path) -> Result<Looked, Failure> {
     let volume = part.mesh.volume();
     // Labels lie beside a mesh under its name.
     let labels = mesh.with_extension("labels.csv");
+    let tessellation = Tessellation::of(&part.mesh);
+    let remeshed = tessellation.and_then(|why| Some((why, remeshed(&part)?)));
     Ok(Looked {
         triangles: part.mesh.face_count(),
         size,
@@ -93,10 +98,16 @@ fn look_at(mesh: &Path) -> Result<Looked, Failure> {
         repairs: part.import.repairs.iter().map(|r| format!("{} ({})", r.what, r.count)).collect(),
         units: guess_units(&part, size),
         filled: volume.abs() / size.iter().product::<f64>(),
-        features: features(&part),
+        features: features(remeshed.as_ref().map_or(&part, |(_, even)| even)),
+        remeshed: remeshed.map(|(why, even)| (why, even.mesh.face_count())),
         labels: labels.is_file().then_some(labels),
         format: part.import.format,
     })
+}
+
+/// The part with even triangles, if it can have them.
+fn remeshed(part: &Part) -> Option<Part> {
+    topipe_remeshing::remesh(part, &topipe_remeshing::Parameters::default(), &Progress::silent()).ok()
 }
 
 /// What smoothing finds. It is asked rather than guessed: it is what the pipeline will do.
@@ -186,6 +197,11 @@ impl Looked {
                     .into(),
             );
         }
+        if let Some((why, triangles)) = self.remeshed {
+            text.push(format!(
+                "as of a CAD system ({why}): remeshed into {triangles} even triangles before all else"
+            ));
+        }
         match &self.features {
             Features::Found { holes, bosses, planes } => {
                 let mut diameters: Vec<String> = holes.iter().map(|d| format!("{d:.4}")).collect();
@@ -269,9 +285,9 @@ units = "{units}"                        # mm, cm, m, um, in, ft
 {field}{labels}      # one 0 or 1 per face; 1 = non-design: not to be moved
 # components = "all"                # keep islands; "largest" drops all but one
 
-[stage.smooth]
+{remesh}[stage.smooth]
 kind = "smoothing"
-input = "mesh"
+input = "{to_smooth}"
 # method = "hc-sdu"                 # laplacian, sdu, hc, taubin, hc-sdu, contract
 {iterations}
 
@@ -292,7 +308,7 @@ input = "quads"
 {frame}{about}
 [stage.check]                       # measures all of it: report.json, report.html
 kind = "validation"
-original = "mesh"
+original = "{to_smooth}"
 mesh = "smooth"
 layout = "quads"
 surface = "surface"
@@ -311,9 +327,13 @@ surface = "surface"
             Some("INP") => SET,
             Some(_) => FIELD,
         },
+        remesh = if looked.remeshed.is_some() { REMESH } else { "" },
+        to_smooth = if looked.remeshed.is_some() { "even" } else { "mesh" },
         iterations = match looked.features {
             Features::Refused(_) =>
                 "iterations = 0                      # leaves the mesh as it is: see above",
+            _ if looked.remeshed.is_some() =>
+                "iterations = 0                      # there is no noise: only finds holes, bosses and flat faces",
             _ => "# iterations = 0                    # leaves the mesh as it is",
         },
     );
@@ -325,6 +345,13 @@ const FIELD: &str = r#"# field = "density"                 # which field says wh
 "#;
 
 const SET: &str = r#"# field = "KEPT"                    # the element set that is the part; all solid elements without it
+"#;
+
+const REMESH: &str = r#"[stage.even]                        # even triangles of the facets of a CAD system
+kind = "remeshing"
+input = "mesh"
+# edge_length = 0.01                # over the diagonal; shorter edges keep smaller details
+
 "#;
 
 const FRAME: &str = r#"

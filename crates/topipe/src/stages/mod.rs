@@ -3,6 +3,7 @@
 mod beams;
 mod import;
 mod quad_matching;
+mod remeshing;
 mod simp;
 mod sizing;
 mod skeleton;
@@ -20,6 +21,7 @@ pub fn registry() -> Registry {
     Registry::new()
         .with_stage(import::Import)
         .with_stage(simp::Simp)
+        .with_stage(remeshing::Remeshing)
         .with_stage(smoothing::Smoothing)
         .with_stage(smoothing_study::SmoothingStudy)
         .with_stage(tiling::Tiling)
@@ -245,6 +247,6 @@ mod tests {
         assert!(versions.iter().all(|version| version.len() == 16));
         versions.sort();
         versions.dedup();
-        assert_eq!(versions.len(), 12);
+        assert_eq!(versions.len(), 13);
     }
 }

@@ -37,6 +37,12 @@ impl Stage for Smoothing {
         parameters: &Parameters,
     ) -> Result<topipe_mesh::Part, StageError> {
         let part = context.input::<Mesh>("input")?;
+        if let Some(tessellation) = topipe_remeshing::Tessellation::of(&part.mesh) {
+            context.progress().warn(&format!(
+                "the mesh looks like one of a CAD system ({tessellation}): smoothing may round its edges off, and the fit takes long; \
+                 put a stage of kind \"remeshing\" before this one"
+            ));
+        }
         smooth(&part, parameters, context.progress()).map_err(|error| match error {
             SmoothingError::Interrupted(_) => StageError::Interrupted,
             SmoothingError::Parameter { .. } => StageError::BadParameter(error.to_string()),

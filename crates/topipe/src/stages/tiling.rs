@@ -12,7 +12,8 @@ impl Stage for Tiling {
     type Parameters = Parameters;
     type Output = artifacts::Tiling;
     const KIND: &'static str = "tiling";
-    const SUMMARY: &'static str = "Partitions a mesh into disks by an augmented Voronoi tessellation.";
+    const SUMMARY: &'static str =
+        "Partitions the free surface of a mesh into disks; holes, flat faces and edges are borders.";
 
     fn code_version(&self) -> String {
         env!("TOPIPE_CODE_TILING").into()
