@@ -52,6 +52,15 @@ pictures python="target/clients/bin/python": gallery
         target/release/topipe -q render surface --pipeline pipelines/$case.toml \
             -o pipelines/pictures/$case.png --size 720x540 || exit 1; \
     done
+    target/release/topipe -q run pipelines/filleted-block.toml
+    for stage in mesh even surface; do \
+        target/release/topipe -q render $stage --pipeline pipelines/filleted-block.toml --edges \
+            -o docs/src/pictures/filleted-block-$stage.png --size 720x540 || exit 1; \
+    done
+    target/release/topipe -q render mesh --pipeline pipelines/filleted-block.toml --edges \
+        -o pipelines/pictures/filleted-block-mesh.png --size 720x540
+    target/release/topipe -q render surface --pipeline pipelines/filleted-block.toml \
+        -o pipelines/pictures/filleted-block.png --size 720x540
     for case in cantilever cantilever-four y-form monster-lite space-frame; do \
         over=$([ $case = space-frame ] && echo mesh || echo smooth); \
         target/release/topipe -q render frame --pipeline pipelines/$case.toml --over $over \

@@ -116,7 +116,10 @@ fn workshop() -> tempfile::TempDir {
     std::fs::create_dir(folder.path().join("meshes")).unwrap();
     std::fs::write(folder.path().join("meshes/part.stl"), part_stl()).unwrap();
     run(folder.path(), &["new", "part.stl"].map(str::to_owned), "set-up");
-    std::fs::copy(folder.path().join("part.toml"), folder.path().join("pipelines/bracket.toml")).unwrap();
+    for example in ["bracket", "filleted-block"] {
+        let pipeline = folder.path().join(format!("pipelines/{example}.toml"));
+        std::fs::copy(folder.path().join("part.toml"), pipeline).unwrap();
+    }
     std::fs::copy(folder.path().join("part.stl"), folder.path().join("pipelines/part.stl")).unwrap();
     folder
 }

@@ -34,6 +34,51 @@ fn a_new_pipeline_is_a_good_one() {
     assert!(shop.read("topipe-out/box/report.html").starts_with("<!DOCTYPE html>"));
 }
 
+/// Strips and needles of a CAD system become the planes and cylinders they were cut from.
+#[test]
+fn a_tessellated_part_is_remeshed_first() {
+    let shop = Workshop::new();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/tessellated");
+    for (part, holes, [planes, cylinders, patches], diameters) in [
+        ("filleted-block", 3, [6, 15, 24], vec![8.0, 8.0, 10.0, 16.0]),
+        ("angle", 5, [8, 5, 0], vec![6.0, 12.0]),
+    ] {
+        std::fs::copy(fixtures.join(format!("{part}.stl")), shop.folder.path().join(format!("{part}.stl")))
+            .unwrap();
+        let ended = shop.topipe(&["new", &format!("{part}.stl")]);
+        assert_eq!(ended.code, 0, "{}", ended.stderr);
+        assert!(ended.stdout.contains("as of a CAD system"), "{}", ended.stdout);
+        assert!(ended.stdout.contains(&format!("{holes} holes")), "{}", ended.stdout);
+        let spec = format!("{part}.toml");
+        assert!(shop.read(&spec).contains("kind = \"remeshing\""));
+        let run = shop.topipe(&["run", &spec]);
+        assert_eq!(run.code, 0, "{}", run.stderr);
+        assert!(run.stdout.contains("all figures are within their limits"), "{}", run.stdout);
+        let report: Value =
+            serde_json::from_str(&shop.read(&format!("topipe-out/{part}/report.json"))).unwrap();
+        let surface = &report["surface"];
+        let found = ["planes", "cylinders", "patches"].map(|name| surface[name].as_u64().unwrap());
+        assert_eq!(found, [planes, cylinders, patches], "{part}");
+        assert!(surface["gap_mm"].as_f64().unwrap() < 1e-6);
+        let step = shop.read(&format!("topipe-out/{part}/{part}.step"));
+        let radii: Vec<f64> = step
+            .lines()
+            .filter_map(|line| line.split_once("CYLINDRICAL_SURFACE("))
+            .map(|(_, rest)| rest.trim_end_matches(");").rsplit(',').next().unwrap().parse().unwrap())
+            .collect();
+        assert_eq!(radii.len() as u64, cylinders);
+        for radius in radii {
+            let off = diameters.iter().map(|d| (2.0 * radius / d - 1.0).abs()).fold(f64::INFINITY, f64::min);
+            assert!(off < 1e-5, "{part}: radius {radius}");
+        }
+        // Without the stage smoothing says what is wrong, and what to do.
+        let bare = shop.read(&spec).replace("input = \"even\"", "input = \"mesh\"");
+        shop.write("bare.toml", &bare);
+        let warned = shop.topipe(&["run", "bare.toml", "--until", "smooth"]);
+        assert!(warned.stderr.contains("put a stage of kind \"remeshing\" before"), "{}", warned.stderr);
+    }
+}
+
 #[test]
 fn a_new_pipeline_takes_labels_and_a_unit_that_fits() {
     let shop = Workshop::new();
