@@ -23,7 +23,7 @@ pub use parameters::Parameters;
 pub use tessellation::Tessellation;
 
 use faces::Faces;
-use topipe_mesh::spatial::{SurfaceIndex, deviation};
+use topipe_mesh::spatial::{SurfaceIndex, crossings, deviation};
 use topipe_mesh::{Connectivity, Design, FaceId, Part, Provenance, Region, RegionId, TriangleMesh, VertexId};
 use topipe_progress::Progress;
 
@@ -33,13 +33,12 @@ const MOST_TRIANGLES: f64 = 2e7;
 /// Remeshes a closed part into triangles of about [`Parameters::edge_length`].
 ///
 /// Vertices lie on the faces that the facets are chords of; those of flat faces and of cylinders within rounding of their shapes, and
-/// these faces are regions of the new part, beside those it had. Labels, regions and
-/// marks of frozen vertices go over to what lies in their place, provenance names places of the mesh that was given; feature edges are
-/// kept where the new mesh has them whole. The topology does not change. One thread does it all: the result does not depend on their
-/// number.
+/// these faces are regions of the new part, beside those it had. Labels, regions and marks of frozen vertices go over to what lies in
+/// their place, provenance names places of the mesh that was given; feature edges are kept where the new mesh has them whole. The
+/// topology does not change. One thread does it all: the result does not depend on their number.
 ///
-/// What lies closer to a face than its facets bulge may end up on its other side: the result is not checked for triangles that pass
-/// through each other.
+/// What lies closer to a face than its facets bulge may end up on its other side: a warning names a place where triangles of the result
+/// pass through each other.
 ///
 /// # Errors
 /// Parameters out of range, meshes that are no closed manifold, meshes without extent, too many triangles, or a run that is stopped.
@@ -94,12 +93,24 @@ pub fn remesh(part: &Part, parameters: &Parameters, progress: &Progress) -> Resu
         known - flats,
         faces.shape.len() - known,
     ));
-    if let (Some(there), Some(back)) = (deviation(&new, mesh, 0), deviation(mesh, &new, 0)) {
+    if let Some(deviation) = deviation(&new, mesh, 0) {
         let (volume, after) = (mesh.volume(), new.volume());
         progress.remark(&format!(
-            "the faces bulge out of the facets by up to {:.4e} mm; volume {:+.4} %",
-            there.max.max(back.max),
+            "at most {:.4e} mm from the facets; volume {:+.4} %",
+            deviation.max,
             100.0 * (after - volume) / volume,
+        ));
+    }
+    let crossed = crossings(&new);
+    if let Some(first) = crossed.first() {
+        let at = first.point;
+        progress.warn(&format!(
+            "{} pairs of triangles pass through each other after remeshing, one at ({:.3}, {:.3}, {:.3}); use a smaller `edge_length`, \
+             or mend the mesh there",
+            crossed.len(),
+            at.x,
+            at.y,
+            at.z
         ));
     }
     Ok(transfer(part, new, &chart, &faces))

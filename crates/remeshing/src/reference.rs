@@ -36,7 +36,7 @@ impl<'a> Reference<'a> {
         }
         let chart = |(own, shape): (&Vec<FaceId>, &Option<RegionShape>)| match shape {
             Some(shape) => Chart::Known(*shape),
-            None => curved(mesh, own, surface),
+            None => curved(own, surface),
         };
         let charts = own.iter().zip(&faces.shape).map(chart).collect();
         Self { surface, charts }
@@ -74,7 +74,7 @@ impl<'a> Reference<'a> {
     }
 }
 
-fn curved(mesh: &TriangleMesh, own: &[FaceId], surface: &Surface<'_>) -> Chart {
+fn curved(own: &[FaceId], surface: &Surface<'_>) -> Chart {
     let mut lifted = TriangleMesh::default();
     let mut origin = Vec::new();
     let mut places: FxHashMap<(u32, u32), VertexId> = FxHashMap::default();
@@ -105,7 +105,6 @@ fn curved(mesh: &TriangleMesh, own: &[FaceId], surface: &Surface<'_>) -> Chart {
             }
         }
     }
-    debug_assert!(own.iter().all(|f| f.index() < mesh.face_count()));
     Chart::Curved { index: SurfaceIndex::build(&lifted), mesh: lifted, origin }
 }
 

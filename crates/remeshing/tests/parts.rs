@@ -292,6 +292,36 @@ fn what_can_not_be_done_is_refused() {
     }
 }
 
+#[derive(Default)]
+struct Warnings(std::sync::Mutex<Vec<String>>);
+
+impl topipe_progress::Listener for Warnings {
+    fn step(&self, _: u64, _: u64, _: &str) {}
+    fn remark(&self, _: &str) {}
+    fn warning(&self, text: &str) {
+        self.0.lock().unwrap().push(text.to_owned());
+    }
+    fn interrupted(&self) -> bool {
+        false
+    }
+}
+
+/// A pin in a hole with less room than the new edges of both bulge.
+#[test]
+fn what_is_nearer_than_chords_bulge_is_warned_of() {
+    let pin = turned(&[(0.0, -1.0), (5.0, -1.0), (5.0, 5.0), (0.0, 5.0)], 12, false);
+    let mut both = turned(&[(5.004, 4.0), (5.004, 0.0), (9.0, 0.0), (9.0, 4.0)], 12, true).mesh;
+    assert!(crossings(&both).is_empty());
+    let first = both.vertex_count() as u32;
+    both.positions.extend(&pin.mesh.positions);
+    both.triangles.extend(pin.mesh.triangles.iter().map(|t| t.map(|v| VertexId(v.0 + first))));
+    assert!(crossings(&both).is_empty());
+    let warnings = std::sync::Arc::new(Warnings::default());
+    remesh(&Part::new(both), &Parameters::default(), &Progress::new(warnings.clone())).unwrap();
+    let said = warnings.0.lock().unwrap();
+    assert!(said.len() == 1 && said[0].contains("pass through each other"), "{said:?}");
+}
+
 /// Whatever the vertices of a closed mesh are moved to: no panic, and the topology is that of before.
 #[test]
 fn noise_is_survived() {
