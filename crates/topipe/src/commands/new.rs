@@ -10,6 +10,7 @@ use topipe_mesh::import::ImportOptions;
 use topipe_mesh::{Connectivity, Part, RegionShape};
 use topipe_progress::{Progress, number};
 use topipe_remeshing::Tessellation;
+use topipe_smoothing::Parameters;
 
 /// Meshes up to so many triangles are smoothed once to see what is in them: about a second.
 const LOOKED_AT: usize = 150_000;
@@ -98,7 +99,11 @@ fn look_at(mesh: &Path) -> Result<Looked, Failure> {
         repairs: part.import.repairs.iter().map(|r| format!("{} ({})", r.what, r.count)).collect(),
         units: guess_units(&part, size),
         filled: volume.abs() / size.iter().product::<f64>(),
-        features: features(remeshed.as_ref().map_or(&part, |(_, even)| even)),
+        features: match &remeshed {
+            // As the pipeline will have it.
+            Some((_, even)) => features(even, Parameters { iterations: Some(0), ..Parameters::default() }),
+            None => features(&part, Parameters::default()),
+        },
         remeshed: remeshed.map(|(why, even)| (why, even.mesh.face_count())),
         labels: labels.is_file().then_some(labels),
         format: part.import.format,
@@ -111,11 +116,10 @@ fn remeshed(part: &Part) -> Option<Part> {
 }
 
 /// What smoothing finds. It is asked rather than guessed: it is what the pipeline will do.
-fn features(part: &Part) -> Features {
+fn features(part: &Part, parameters: Parameters) -> Features {
     if part.mesh.face_count() > LOOKED_AT {
         return Features::NotLookedFor;
     }
-    let parameters = topipe_smoothing::Parameters::default();
     let smoothed = match topipe_smoothing::smooth(part, &parameters, &Progress::silent()) {
         Ok(smoothed) => smoothed,
         Err(error) => return Features::Refused(error.to_string()),
