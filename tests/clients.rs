@@ -203,6 +203,35 @@ fn check_solid(python: &Path, folder: &Path, sizes: [f64; 4]) {
     assert!(ours <= 1.5 * farthest + chord, "largest deviation: ours {ours}, theirs {farthest}");
 }
 
+/// Facets of a CAD system become the planes and cylinders they were cut from: two holes that cross, the wall of one of them with both
+/// ends around it and two more borders between, where its seam must not run.
+#[test]
+fn a_remeshed_block_with_crossing_holes_opens_as_a_solid() {
+    let Some(python) = clients() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(
+        root().join("fixtures/tessellated/filleted-block.stl"),
+        folder.path().join("filleted-block.stl"),
+    )
+    .unwrap();
+    let spec = "name = \"block\"\n\
+         [stage.mesh]\nkind = \"import\"\npath = \"filleted-block.stl\"\n\
+         [stage.even]\nkind = \"remeshing\"\ninput = \"mesh\"\n\
+         [stage.smooth]\nkind = \"smoothing\"\ninput = \"even\"\niterations = 0\n\
+         [stage.tiles]\nkind = \"tiling\"\ninput = \"smooth\"\n\
+         [stage.quads]\nkind = \"quad-matching\"\ninput = \"tiles\"\n\
+         [stage.surface]\nkind = \"spline-fit\"\ninput = \"quads\"\n\
+         [stage.check]\nkind = \"validation\"\noriginal = \"even\"\nmesh = \"smooth\"\nlayout = \"quads\"\n\
+         surface = \"surface\"\n\
+         [export]\n\"smooth.stl\" = \"smooth\"\n\"part.step\" = \"surface\"\n\"report.json\" = \"check\"\n";
+    fs::write(folder.path().join("block.toml"), spec).unwrap();
+    run(Command::new(env!("CARGO_BIN_EXE_topipe"))
+        .args(["run", "-q", "block.toml", "--out", ".", "--cache", "cache"])
+        .current_dir(folder.path()))
+    .unwrap();
+    check_solid(python, folder.path(), [16.0, 8.0, 6.0, 4.0]);
+}
+
 /// The smoothed mesh is closed, keeps its volume and its holes.
 fn check_mesh(python: &Path, folder: &Path, case: &str) {
     let facts = root().join("fixtures").join(case).join(format!("{case}.json"));
