@@ -459,7 +459,22 @@ fn run(
         let volume = match &mut keeper {
             Some(keeper) => {
                 let wanted = keeper.wanted();
-                keeper.restore(domain, &mut next, edge).map_err(|v| out_of_reach(iteration, v, wanted))?
+                match keeper.restore(domain, &mut next, edge) {
+                    Ok(volume) => volume,
+                    // Sliding outlines take what few others can not give: nothing here is to be smoothed but outlines.
+                    Err(_) if free - domain.slides.len() < domain.slides.len() => {
+                        progress.warn(&format!(
+                            "the mesh is left as it is: the {} free vertices can not make up for the volume that the {} sliding ones \
+                             take in iteration {iteration}; set `slide_outlines = false` or `preserve_volume = false`",
+                            free - domain.slides.len(),
+                            domain.slides.len(),
+                        ));
+                        *record =
+                            SmoothingRecord { method: record.method.clone(), ..SmoothingRecord::default() };
+                        return Ok(original.clone());
+                    }
+                    Err(volume) => return Err(out_of_reach(iteration, volume, wanted)),
+                }
             }
             None if observe.is_some() => six_volumes(&mesh.triangles, center, &next) / 6.0,
             None => f64::NAN,
