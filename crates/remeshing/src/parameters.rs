@@ -14,7 +14,8 @@ pub struct Parameters {
     pub sharp_angle: f64,
 }
 
-/// CAD systems cut curved faces into facets that differ by up to 30 degrees; chamfers of three sides of a corner by 35.
+/// More than the facets of a cylinder of twelve sides (30 degrees; OpenCASCADE allows half a radian by default), less than chamfers of
+/// three edges that meet in a corner (35).
 const SHARP_ANGLE: f64 = 32.0;
 
 impl Default for Parameters {

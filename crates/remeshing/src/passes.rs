@@ -34,10 +34,10 @@ type Span = (HalfEdgeId, f64, f64);
 
 /// A mesh on its way.
 pub(crate) struct Passes<'a> {
-    pub(crate) mesh: TriangleMesh,
+    mesh: TriangleMesh,
     edges: HalfEdges,
     /// Per triangle.
-    pub(crate) chart: Vec<u32>,
+    chart: Vec<u32>,
     /// Per vertex: the length of edges.
     size: Vec<f64>,
     /// Per vertex: on a feature, where it stays; thinned out only if not a corner.
@@ -394,7 +394,7 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Drops what is gone: the mesh, the chart of each triangle, and the features as pairs of vertices, in order.
+    /// The mesh without what is gone, and the chart of each triangle.
     pub(crate) fn finish(self) -> (TriangleMesh, Vec<u32>) {
         let mut number = vec![VertexId::NONE; self.mesh.vertex_count()];
         let mut mesh = TriangleMesh::default();

@@ -42,7 +42,7 @@ impl<'a> Reference<'a> {
         Self { surface, charts }
     }
 
-    /// A point near `p` on the border of two charts, on the shapes of both as far as they are known. Where they touch, `p` itself: there
+    /// A point near `p` on the border of two charts, on the shapes of both as far as they are known. Where they touch, on the first:
     /// rounding would decide where they meet.
     pub(crate) fn between(&self, charts: [u32; 2], p: DVec3) -> DVec3 {
         let known = charts.map(|c| match &self.charts[c as usize] {

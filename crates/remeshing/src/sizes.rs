@@ -5,7 +5,7 @@ use crate::surface::Surface;
 use crate::tangents::Place;
 use topipe_mesh::{Connectivity, HalfEdgeId, TriangleMesh};
 
-/// Edges are this many radii long where the surface bends: 21 around a hole, as CAD systems have them by default. With 12 the angle bracket
+/// Edges are this many radii long where the surface bends: 21 around a hole, as the facets of the fixtures. With 12 the angle bracket
 /// of the fixtures lost 0.11 % of its volume between the facets and its holes.
 const RADII: f64 = 0.3;
 

@@ -3,7 +3,7 @@
 use topipe_mesh::TriangleMesh;
 
 /// Above any of these a mesh is taken for a tessellation. Seventeen results of optimization, of up to a million triangles, have at most
-/// 0.07, 0.042 and 16; eighteen parts as two CAD systems write them exceed at least one but for two whose triangles are even: 0.33 to 1,
+/// 0.07, 0.042 and 16; eighteen parts as OpenCASCADE and trimesh write them exceed at least one but for two whose triangles are even: 0.33 to 1,
 /// 0.19 to 0.88, or 23 to 65.
 const SLENDER: f64 = 0.2;
 const COARSE: f64 = 0.15;
