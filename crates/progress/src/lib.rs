@@ -18,9 +18,11 @@
 //! Nothing that passes through a [`Progress`] may reach an artifact: progress is for people, results are not.
 
 mod quantities;
+mod recorder;
 mod units;
 
 pub use quantities::{duration, number, size};
+pub use recorder::Recorder;
 pub use units::{UnitKey, UnitKeyHasher, UnitStore, Units};
 
 use std::fmt;

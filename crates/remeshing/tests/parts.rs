@@ -5,7 +5,7 @@ use topipe_mesh::spatial::crossings;
 use topipe_mesh::{
     Connectivity, DVec3, Design, FaceId, Part, Provenance, RegionShape, TriangleMesh, VertexId,
 };
-use topipe_progress::Progress;
+use topipe_progress::{Progress, Recorder};
 use topipe_remeshing::{Parameters, RemeshingError, Tessellation, remesh};
 
 fn remeshed(part: &Part) -> Part {
@@ -292,20 +292,6 @@ fn what_can_not_be_done_is_refused() {
     }
 }
 
-#[derive(Default)]
-struct Warnings(std::sync::Mutex<Vec<String>>);
-
-impl topipe_progress::Listener for Warnings {
-    fn step(&self, _: u64, _: u64, _: &str) {}
-    fn remark(&self, _: &str) {}
-    fn warning(&self, text: &str) {
-        self.0.lock().unwrap().push(text.to_owned());
-    }
-    fn interrupted(&self) -> bool {
-        false
-    }
-}
-
 /// A pin in a hole with less room than the new edges of both bulge.
 #[test]
 fn what_is_nearer_than_chords_bulge_is_warned_of() {
@@ -316,9 +302,9 @@ fn what_is_nearer_than_chords_bulge_is_warned_of() {
     both.positions.extend(&pin.mesh.positions);
     both.triangles.extend(pin.mesh.triangles.iter().map(|t| t.map(|v| VertexId(v.0 + first))));
     assert!(crossings(&both).is_empty());
-    let warnings = std::sync::Arc::new(Warnings::default());
+    let warnings = std::sync::Arc::new(Recorder::default());
     remesh(&Part::new(both), &Parameters::default(), &Progress::new(warnings.clone())).unwrap();
-    let said = warnings.0.lock().unwrap();
+    let said = warnings.warnings();
     assert!(said.len() == 1 && said[0].contains("pass through each other"), "{said:?}");
 }
 

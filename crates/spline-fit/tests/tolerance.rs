@@ -3,34 +3,18 @@
 mod common;
 
 use common::{fixture, largest_jump};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use topipe_mesh::Connectivity;
 use topipe_mesh::spatial::SurfaceIndex;
-use topipe_progress::{Listener, Progress, Units};
+use topipe_progress::{Progress, Recorder, Units};
 use topipe_quad_matching::QuadLayout;
 use topipe_spline_fit::{Parameters, SplineSurface, fit};
 
-/// Keeps what is remarked.
-#[derive(Default)]
-struct Remarks(Mutex<Vec<String>>);
-
-impl Listener for Remarks {
-    fn step(&self, _: u64, _: u64, _: &str) {}
-
-    fn remark(&self, text: &str) {
-        self.0.lock().unwrap().push(text.to_owned());
-    }
-
-    fn interrupted(&self) -> bool {
-        false
-    }
-}
-
 /// A fit, and what it remarks about the tolerance.
 fn fitted(layout: &QuadLayout, parameters: &Parameters) -> (SplineSurface, Vec<String>) {
-    let remarks = Arc::new(Remarks::default());
+    let remarks = Arc::new(Recorder::default());
     let surface = fit(layout, parameters, &Units::none(), &Progress::new(remarks.clone())).unwrap();
-    let mut all = std::mem::take(&mut *remarks.0.lock().unwrap());
+    let mut all = remarks.all();
     all.retain(|text| text.starts_with("beyond the tolerance"));
     (surface, all)
 }
@@ -86,7 +70,7 @@ fn patches_are_divided_until_the_tolerance_holds() {
 #[test]
 fn other_corners_are_tried_and_threads_do_not_matter() {
     let layout = fixture("monster-lite");
-    let remarks = Arc::new(Remarks::default());
+    let remarks = Arc::new(Recorder::default());
     let progress = Progress::new(remarks.clone());
     let tolerance = 9e-4;
     let on = |threads: usize| {
@@ -95,7 +79,7 @@ fn other_corners_are_tried_and_threads_do_not_matter() {
         pool.install(|| fit(&layout, &parameters, &Units::none(), &progress).unwrap())
     };
     let surface = on(1);
-    let remarks = std::mem::take(&mut *remarks.0.lock().unwrap());
+    let remarks = remarks.all();
     // "divided around 4 vertices; around 3 of them the surface is nearer"
     let counts = |text: &String| -> Option<[usize; 2]> {
         let words: Vec<&str> = text.strip_prefix("divided around ")?.split(' ').collect();
@@ -120,14 +104,14 @@ fn patches_are_untangled_unless_told_otherwise() {
     let tangled = fitted(&layout, &Parameters { untangle: false, ..Default::default() }).0;
     assert_eq!(tangled.patches.len(), layout.quads.len());
     assert!(crossed(&layout, &tangled) > 0);
-    let remarks = Arc::new(Remarks::default());
+    let remarks = Arc::new(Recorder::default());
     let progress = Progress::new(remarks.clone());
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| fit(&layout, &Parameters::default(), &Units::none(), &progress).unwrap())
     };
     let surface = on(1);
-    let remarks = std::mem::take(&mut *remarks.0.lock().unwrap());
+    let remarks = remarks.all();
     assert!(remarks.iter().any(|text| text.contains("each other at one place, one at (")), "{remarks:?}");
     assert_eq!(crossed(&layout, &surface), 0);
     assert!((1..20).contains(&(surface.patches.len() - tangled.patches.len())));

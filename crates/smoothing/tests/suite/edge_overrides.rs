@@ -2,9 +2,9 @@
 
 use crate::shapes::{lens, shake, voxels};
 use crate::{read, smoothed};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use topipe_mesh::{Connectivity, DVec3, FeatureEdge, FeatureKind, Part};
-use topipe_progress::{Listener, Progress};
+use topipe_progress::{Progress, Recorder};
 use topipe_smoothing::features::{Action, EdgeChain, FeatureOverride, Shape, Space, edge_chains};
 use topipe_smoothing::{Method, Parameters, smooth};
 
@@ -45,19 +45,6 @@ fn refusal(part: &Part, parameters: &Parameters) -> String {
     smooth(part, parameters, &Progress::silent()).expect_err("it must be refused").to_string()
 }
 
-#[derive(Default)]
-struct Remarks(Mutex<Vec<String>>);
-
-impl Listener for Remarks {
-    fn step(&self, _: u64, _: u64, _: &str) {}
-    fn remark(&self, text: &str) {
-        self.0.lock().expect("no panic").push(text.to_owned());
-    }
-    fn interrupted(&self) -> bool {
-        false
-    }
-}
-
 #[test]
 fn a_block_with_a_step_has_its_eighteen_edges() {
     let listed = chains(&smoothed(&step(), &still(vec![])));
@@ -82,13 +69,13 @@ fn one_edge_is_dropped_by_the_box_of_its_row_and_nothing_else_changes() {
     let inner = |c: &&EdgeChain| c.min == DVec3::new(7.0, 0.0, 4.0) && c.max == DVec3::new(7.0, 10.0, 4.0);
     let listed = chains(&all);
     let row = listed.iter().find(inner).expect("the inner edge of the step");
-    let remarks = Arc::new(Remarks::default());
+    let remarks = Arc::new(Recorder::default());
     let parameters = still(vec![entry(Action::Drop, around(row))]);
     let fewer = smooth(&part, &parameters, &Progress::new(remarks.clone())).expect("smoothed");
     assert_eq!(of_kind(&fewer, FeatureKind::Sharp).len() + 10, of_kind(&all, FeatureKind::Sharp).len());
     assert!(chains(&fewer).iter().all(|c| listed.contains(c) && c != row));
     assert!(Part { feature_edges: all.feature_edges.clone(), ..fewer } == all);
-    let remarks = remarks.0.lock().expect("no panic").join("\n");
+    let remarks = remarks.all().join("\n");
     for part in ["entry 1 of `features`", "all 10 sharp edges", "borders of faces of known shape"] {
         assert!(remarks.contains(part), "{part} is missing in: {remarks}");
     }
@@ -169,10 +156,10 @@ fn an_edge_of_the_free_surface_is_added_and_held() {
     assert_eq!((listed[0].kind_name(), listed[0].edges()), ("user", 64));
     assert!(listed[0].angle > 45.0, "{}", listed[0].angle);
     let remarks = |part: &Part| {
-        let (remarks, features) = (Arc::new(Remarks::default()), vec![entry(Action::Add, EVERYWHERE)]);
+        let (remarks, features) = (Arc::new(Recorder::default()), vec![entry(Action::Add, EVERYWHERE)]);
         let parameters = Parameters { features, ..parameters.clone() };
         smooth(part, &parameters, &Progress::new(remarks.clone())).expect("smoothed");
-        remarks.0.lock().expect("no panic").join("\n")
+        remarks.all().join("\n")
     };
     let text = remarks(&part);
     assert!(

@@ -3,7 +3,7 @@
 use crate::{facts, file, read, smoothed};
 use topipe_mesh::import::ImportOptions;
 use topipe_mesh::{Connectivity, DVec3, Design, FeatureKind, Part, RegionShape, TriangleMesh};
-use topipe_progress::Progress;
+use topipe_progress::{Progress, Recorder};
 use topipe_smoothing::{Method, Parameters, smooth};
 
 #[test]
@@ -291,33 +291,19 @@ fn notched_prism() -> TriangleMesh {
     TriangleMesh::from_arrays(positions, triangles)
 }
 
-#[derive(Default)]
-struct Warnings(std::sync::Mutex<Vec<String>>);
-
-impl topipe_progress::Listener for Warnings {
-    fn step(&self, _: u64, _: u64, _: &str) {}
-    fn remark(&self, _: &str) {}
-    fn warning(&self, text: &str) {
-        self.0.lock().unwrap().push(text.to_owned());
-    }
-    fn interrupted(&self) -> bool {
-        false
-    }
-}
-
 /// One free vertex beside outlines that slide: it can not make up for what they take.
 #[test]
 fn a_mesh_whose_volume_would_be_lost_is_left_as_it_is() {
     let bytes = std::fs::read(file("voxels", "stl")).unwrap();
     let part = topipe_mesh::import::read("voxels.stl", &bytes, &ImportOptions::default()).unwrap();
-    let warnings = std::sync::Arc::new(Warnings::default());
+    let warnings = std::sync::Arc::new(Recorder::default());
     let progress = Progress::new(warnings.clone());
     let smoothed = smooth(&part, &Parameters::default(), &progress).unwrap();
     let record = smoothed.smoothing.as_ref().unwrap();
     assert_eq!((record.iterations, record.total_change), (0, 0.0));
     assert_eq!(smoothed.mesh, part.mesh);
     assert!(!smoothed.regions.is_empty());
-    let said = warnings.0.lock().unwrap();
+    let said = warnings.warnings();
     assert_eq!(said.iter().filter(|text| text.contains("left as it is")).count(), 1, "{said:?}");
     // Without sliding it is smoothed, and keeps its volume.
     let parameters = Parameters { slide_outlines: false, ..Parameters::default() };

@@ -89,31 +89,17 @@ fn too_coarse(part: &Part, tiling: &Tiling) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::{Arc, Mutex};
+    use std::sync::Arc;
     use topipe_mesh::{Region, TriangleMesh};
-    use topipe_progress::Listener;
-
-    #[derive(Default)]
-    struct Warnings(Mutex<Vec<String>>);
-
-    impl Listener for Warnings {
-        fn step(&self, _: u64, _: u64, _: &str) {}
-        fn remark(&self, _: &str) {}
-        fn warning(&self, text: &str) {
-            self.0.lock().unwrap().push(text.to_owned());
-        }
-        fn interrupted(&self) -> bool {
-            false
-        }
-    }
+    use topipe_progress::Recorder;
 
     /// The warnings of a tessellation with the default parameters, changed by `change`.
     fn warnings(part: &Part, change: impl FnOnce(&mut Parameters)) -> Vec<String> {
         let mut parameters = Parameters::default();
         change(&mut parameters);
-        let said = Arc::new(Warnings::default());
+        let said = Arc::new(Recorder::default());
         crate::tile(part, &parameters, &Progress::new(said.clone())).unwrap();
-        said.0.lock().unwrap().clone()
+        said.warnings()
     }
 
     /// A closed surface of cubes: those of a 3 x 3 x `length` grid, without the middle column where `hollow`.
