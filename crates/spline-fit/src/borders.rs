@@ -50,7 +50,7 @@ pub(crate) struct Borders {
 /// `connectivity` is that of the layout's mesh. Fails when the layout's arrays do not fit together.
 pub(crate) fn borders(layout: &QuadLayout, connectivity: &Connectivity) -> Result<Borders, SplineFitError> {
     let sides = sides(layout)?;
-    let diagonal = layout.part.mesh.diagonal();
+    let diagonal = rounded(layout.part.mesh.diagonal());
     let tolerance = TOLERANCE * diagonal;
     let shapes = shapes(layout, &sides, tolerance);
     let faces = layout
@@ -121,8 +121,7 @@ fn room(layout: &QuadLayout, sides: &[Beside]) -> Vec<f64> {
 }
 
 /// The length of an edge of a face at a random place of the surface, mm. Cuts leave many short edges beside them, which
-/// hardly count here: it is about the mean edge length of the mesh before it was cut. Rounded to a 64th of an octave: all borders
-/// depend on it, and where a mesh is edited or divided in one place those of other places shall stay what they are.
+/// hardly count here: it is about the mean edge length of the mesh before it was cut.
 fn grain(mesh: &TriangleMesh) -> f64 {
     let (mut sum, mut area) = (0.0, 0.0);
     for f in mesh.faces() {
@@ -131,7 +130,13 @@ fn grain(mesh: &TriangleMesh) -> f64 {
         sum += weight * (a.distance(b) + b.distance(c) + c.distance(a)) / 3.0;
         area += weight;
     }
-    if sum > 0.0 && area > 0.0 { ((64.0 * (sum / area).log2()).round() / 64.0).exp2() } else { 0.0 }
+    if sum > 0.0 && area > 0.0 { rounded(sum / area) } else { 0.0 }
+}
+
+/// A length rounded to a 64th of an octave. All borders depend on some lengths of the whole part, and where a mesh is edited or
+/// divided in one place those of other places shall stay what they are.
+fn rounded(length: f64) -> f64 {
+    if length > 0.0 { ((64.0 * length.log2()).round() / 64.0).exp2() } else { 0.0 }
 }
 
 /// The regions beside an edge: of the loop that runs along it, and of the loop that runs against it.
