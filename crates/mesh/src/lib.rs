@@ -7,6 +7,7 @@
 //!
 //! Lengths are in millimetres once a mesh has been imported; nothing in this crate depends on that.
 
+mod carry;
 pub mod coarsen;
 mod connectivity;
 mod csr;
@@ -25,6 +26,7 @@ pub mod spatial;
 pub mod triangle_mesh;
 pub mod write;
 
+pub use carry::Difference;
 pub use connectivity::{Connectivity, ConnectivityError};
 pub use glam::{DMat3, DVec3};
 pub use ids::{FaceId, HalfEdgeId, RegionId, VertexId};

@@ -1,10 +1,12 @@
 //! The quadrilateral layout: macro-vertices, macro-edges and macro-quads over a refined mesh.
 
+use crate::cost::within_gates;
 use crate::pairing::face_angle;
 use crate::{Parameters, QuadMatchingError};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use topipe_mesh::{FeatureKind, HalfEdgeId, Part, RegionId, VertexId};
+use topipe_mesh::{Difference, FeatureKind, HalfEdgeId, Part, RegionId, VertexId};
+use topipe_tiling::Tiling;
 
 /// A side of a macro-quad: a macro-edge and the direction in which the quad runs along it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -78,6 +80,22 @@ impl QuadLayout {
             return Err(QuadMatchingError::ReflexCorner { quads: above, limit, widest });
         }
         Ok(())
+    }
+
+    /// This layout of the tiling `from` on one that differs from it in shape only: the same quads, moved along. Where nothing has
+    /// moved it is the same bits.
+    ///
+    /// Corners become wider or narrower where the surface was sheared; see [`Self::outside_gates`].
+    ///
+    /// # Errors
+    /// When the parts of the tilings differ in more than shape, or this layout was made of another tiling.
+    pub fn carried(&self, from: &Tiling, onto: &Tiling) -> Result<Self, Difference> {
+        Ok(Self { part: self.part.carried(&from.part, &onto.part)?, ..self.clone() })
+    }
+
+    /// How many corners are outside the gates: narrower than 15 degrees or wider than 165.
+    pub fn outside_gates(&self) -> usize {
+        self.corner_angles().iter().flatten().filter(|&&angle| !within_gates(angle)).count()
     }
 
     /// Stands in [`Self::quad_of_face`] for faces that lie in a region face.

@@ -47,6 +47,7 @@
 
 mod alpha;
 mod blocks;
+mod earlier;
 mod error;
 pub mod features;
 mod finish;
@@ -62,6 +63,7 @@ pub mod study;
 mod vector;
 mod volume;
 
+pub use earlier::{Earlier, smooth_after};
 pub use error::SmoothingError;
 pub use parameters::{Method, Parameters, Weights};
 pub use smooth::smooth;

@@ -3,6 +3,7 @@
 mod alpha;
 mod bad_input;
 mod detection;
+mod earlier;
 mod edge_overrides;
 mod embedding;
 mod guarantees;
