@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Stage, its crate, and the file of its adapter in `stages` and of its writers in `export`. Pictures, exchange formats and
 /// the report are no stages, they
 /// have a writer only.
-const PARTS: [(&str, &str, &str); 16] = [
+const PARTS: [(&str, &str, &str); 17] = [
     ("IMPORT", "mesh", "import.rs"),
     ("SIMP", "simp", "simp.rs"),
     ("REMESHING", "remeshing", "remeshing.rs"),
@@ -19,6 +19,7 @@ const PARTS: [(&str, &str, &str); 16] = [
     ("SMOOTHING_STUDY", "smoothing", "smoothing_study.rs"),
     ("TILING", "tiling", "tiling.rs"),
     ("QUAD_MATCHING", "quad-matching", "quad_matching.rs"),
+    ("LAYOUT_UPDATE", "quad-matching", "layout_update.rs"),
     ("SPLINE_FIT", "spline-fit", "spline_fit.rs"),
     ("SKELETON", "skeleton", "skeleton.rs"),
     ("BEAMS", "beams", "beams.rs"),

@@ -2,6 +2,7 @@
 
 mod beginning;
 mod caching;
+mod editing;
 mod edits;
 #[cfg(target_os = "linux")]
 mod full_disk;

@@ -7,7 +7,6 @@
 //!
 //! Lengths are in millimetres once a mesh has been imported; nothing in this crate depends on that.
 
-mod carry;
 pub mod coarsen;
 mod connectivity;
 mod csr;
@@ -18,6 +17,7 @@ pub mod fit;
 pub mod half_edges;
 mod ids;
 pub mod import;
+mod lineage;
 pub mod measures;
 mod meet;
 pub mod part;
@@ -26,10 +26,10 @@ pub mod spatial;
 pub mod triangle_mesh;
 pub mod write;
 
-pub use carry::Difference;
 pub use connectivity::{Connectivity, ConnectivityError};
 pub use glam::{DMat3, DVec3};
 pub use ids::{FaceId, HalfEdgeId, RegionId, VertexId};
+pub use lineage::Lineage;
 pub use meet::meet;
 pub use part::{
     Design, FeatureEdge, FeatureKind, ImportRecord, Part, Provenance, Region, RegionShape, Repair,

@@ -190,6 +190,8 @@ pub struct SmoothingRecord {
     pub total_change: f64,
     /// The same summed over iterations, mm.
     pub cumulative_change: f64,
+    /// Vertices that were put back to where the smoothing of an earlier version had left them.
+    pub kept: u32,
     /// Per iteration: RMS step over the mean edge length (dimensionless).
     pub rms_steps: Vec<f64>,
     /// Signed volume after each iteration, mm^3, where it was computed: in each one where the volume is kept, else after the

@@ -29,7 +29,7 @@ pub fn match_quads(
         return Err(QuadMatchingError::Parameter { field: "pairing", value, range });
     }
     if parameters.pairing == Pairing::Midpoint || tiling.bordered {
-        return crate::midpoint::subdivide(tiling, parameters, progress);
+        return crate::midpoint::subdivide(tiling, None, parameters, progress);
     }
     if tiling.tile_of_face.len() != tiling.part.mesh.face_count() || tiling.anchors.len() != tiles {
         return Err(QuadMatchingError::Tiling("its arrays do not fit together".into()));
@@ -118,7 +118,9 @@ pub fn match_quads(
             quad_of_face: regions.tiled.tile_of_face.clone(),
             tiled: regions.tiled,
         },
-        Pairing::Refined | Pairing::Midpoint => refine(regions, parameters.snap, progress)?,
+        Pairing::Refined | Pairing::Midpoint => {
+            refine(regions, &Default::default(), parameters.snap, progress)?
+        }
     };
     let (part, _): (Part, Vec<FaceId>) = quads.tiled.refiner.finish();
     let mut layout = QuadLayout {

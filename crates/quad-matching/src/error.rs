@@ -50,6 +50,9 @@ pub enum QuadMatchingError {
         /// The widest corner, degrees.
         widest: f64,
     },
+    /// What was to be laid out anew could not be tiled.
+    #[error(transparent)]
+    NotTiled(#[from] topipe_tiling::TilingError),
     /// The run is being stopped.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),

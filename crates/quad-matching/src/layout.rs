@@ -5,8 +5,7 @@ use crate::pairing::face_angle;
 use crate::{Parameters, QuadMatchingError};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use topipe_mesh::{Difference, FeatureKind, HalfEdgeId, Part, RegionId, VertexId};
-use topipe_tiling::Tiling;
+use topipe_mesh::{FeatureKind, HalfEdgeId, Part, RegionId, VertexId};
 
 /// A side of a macro-quad: a macro-edge and the direction in which the quad runs along it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,17 +79,6 @@ impl QuadLayout {
             return Err(QuadMatchingError::ReflexCorner { quads: above, limit, widest });
         }
         Ok(())
-    }
-
-    /// This layout of the tiling `from` on one that differs from it in shape only: the same quads, moved along. Where nothing has
-    /// moved it is the same bits.
-    ///
-    /// Corners become wider or narrower where the surface was sheared; see [`Self::outside_gates`].
-    ///
-    /// # Errors
-    /// When the parts of the tilings differ in more than shape, or this layout was made of another tiling.
-    pub fn carried(&self, from: &Tiling, onto: &Tiling) -> Result<Self, Difference> {
-        Ok(Self { part: self.part.carried(&from.part, &onto.part)?, ..self.clone() })
     }
 
     /// How many corners are outside the gates: narrower than 15 degrees or wider than 165.

@@ -34,11 +34,13 @@ mod relax;
 mod sides;
 mod spokes;
 mod straighten;
+mod update;
 mod verify;
 
 pub use divide::{Division, divide};
 pub use dual::match_quads;
 pub use error::QuadMatchingError;
 pub use layout::{MacroEdge, QuadLayout, RegionFace, Side};
-pub use parameters::{Pairing, Parameters};
+pub use parameters::{Pairing, Parameters, UpdateParameters};
+pub use update::{Earlier, update};
 pub use verify::verify;

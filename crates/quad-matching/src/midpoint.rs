@@ -11,6 +11,8 @@ use crate::outlines::outlines;
 use crate::refine::{Quads, Regions, refine};
 use crate::relax::{Effort, Incidence, relax};
 use crate::{Parameters, QuadLayout, QuadMatchingError, RegionFace, Side};
+use rustc_hash::FxHashSet;
+use topipe_mesh::VertexId;
 use topipe_progress::Progress;
 use topipe_tiling::Tiling;
 
@@ -21,8 +23,11 @@ const RELAXATION_ROUNDS: u32 = 3;
 /// had one or two.
 const SEARCH_ROUNDS: u32 = 4;
 
+/// With `given` it makes a part of a layout, of which the rest is there already: edges with one of these vertices inside are halved there,
+/// and no quad is divided further, as that would halve edges of the rest.
 pub(crate) fn subdivide(
     tiling: &Tiling,
+    given: Option<&FxHashSet<VertexId>>,
     parameters: &Parameters,
     progress: &Progress,
 ) -> Result<QuadLayout, QuadMatchingError> {
@@ -34,7 +39,7 @@ pub(crate) fn subdivide(
         regions = regions.coarsen()?;
     }
     let Quads { mut tiled, vertices, edges, quads, quad_of_face } =
-        refine(regions, parameters.snap, progress)?;
+        refine(regions, given.unwrap_or(&FxHashSet::default()), parameters.snap, progress)?;
     tiled.tile_of_face = quad_of_face;
     let sides = quads.iter().map(|quad| quad.to_vec()).collect();
     let mut fine = Regions { tiled, vertices, edges, sides };
@@ -57,7 +62,7 @@ pub(crate) fn subdivide(
     if turned > 0 {
         progress.remark(&format!("ends of edges turned {turned} times beside corners outside the gates"));
     }
-    let wide = opposite_wide_corners(&fine);
+    let wide = if given.is_some() { Vec::new() } else { opposite_wide_corners(&fine) };
     let Regions { tiled, vertices, edges, .. } = fine;
     let quad_of_face = tiled.tile_of_face;
     let region_faces = faces.into_iter().map(halved).collect();

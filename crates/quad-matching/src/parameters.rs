@@ -39,6 +39,16 @@ pub struct Parameters {
     pub snap: f64,
 }
 
+/// Parameters of [`crate::update`], which hold for what is laid out anew; those that the earlier layout was made with fit best.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct UpdateParameters {
+    /// How tiles are made, as in a stage of kind "tiling".
+    pub tiles: topipe_tiling::Parameters,
+    /// How quads are made of them, as in a stage of kind "quad-matching".
+    pub quads: Parameters,
+}
+
 /// One round brings the widest corner of the bell-crank from 228 to 179 degrees (but for one) and the narrowest from
 /// 2 to 7, of the cantilever the narrowest from 1 to 3; patches that fold over fall by a fifth. A second round costs
 /// as much again and changes little.

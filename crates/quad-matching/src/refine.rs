@@ -137,8 +137,13 @@ pub(crate) fn middle_of(
     }
 }
 
-/// Refines all regions.
-pub(crate) fn refine(regions: Regions, snap: f64, progress: &Progress) -> Result<Quads, QuadMatchingError> {
+/// Refines all regions. An edge that has one of the vertices `given` inside is halved there.
+pub(crate) fn refine(
+    regions: Regions,
+    given: &FxHashSet<VertexId>,
+    snap: f64,
+    progress: &Progress,
+) -> Result<Quads, QuadMatchingError> {
     let Regions { mut tiled, mut vertices, edges, sides } = regions;
     // Halves of the edges: 2 e from the first end to the middle, 2 e + 1 from there to the last end.
     let mut fine = Vec::with_capacity(2 * edges.len());
@@ -150,7 +155,8 @@ pub(crate) fn refine(regions: Regions, snap: f64, progress: &Progress) -> Result
     }
     for (edge, beside) in edges.iter().zip(&beside) {
         let mut path = edge.path.clone();
-        let k = middle_of(&mut tiled, &mut path, edge.feature, snap, beside);
+        let known = (1..path.len() - 1).find(|&k| given.contains(&path[k]));
+        let k = known.unwrap_or_else(|| middle_of(&mut tiled, &mut path, edge.feature, snap, beside));
         let number = vertices.len() as u32;
         vertices.push(path[k]);
         middles.push(path[k]);

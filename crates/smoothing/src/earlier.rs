@@ -8,7 +8,7 @@
 use crate::smooth::smooth;
 use crate::{Parameters, SmoothingError};
 use std::collections::{BTreeMap, BTreeSet};
-use topipe_mesh::{FaceId, FeatureEdge, Part, RegionId, RegionShape, meet};
+use topipe_mesh::{FeatureEdge, Part, RegionId, RegionShape, VertexId, meet};
 use topipe_progress::Progress;
 
 /// Over the mean edge length: what has moved by less before smoothing was not edited. File formats with decimal numbers round
@@ -100,11 +100,14 @@ fn keep(part: &Part, smoothed: Part, earlier: Earlier<'_>, progress: &Progress) 
             same[v] = true;
             kept.mesh.positions[v] = old;
             kept.frozen[v] = before.frozen[v];
-        } else if on().any(|(_, settled)| settled) {
+        } else if !kept.frozen[v] && on().any(|(_, settled)| settled) {
             // Its shape was put back, and it follows.
             let own: Vec<&RegionShape> = on().map(|(shape, _)| shape).collect();
             kept.mesh.positions[v] = meet(&own, new);
         }
+    }
+    if let Some(record) = &mut kept.smoothing {
+        record.kept = same.iter().filter(|same| **same).count() as u32;
     }
     keep_edges(&mut kept, before, &same);
     measure_regions(&mut kept, before, &same);
@@ -123,7 +126,7 @@ fn keep(part: &Part, smoothed: Part, earlier: Earlier<'_>, progress: &Progress) 
 }
 
 /// Gives regions the order and the shapes of the earlier ones with most of the same faces. Returns for each whether its shape is the
-/// earlier one, or as good as it.
+/// earlier one: at least half of its faces are untouched, and these are as near to it as makes no difference.
 ///
 /// Faces of which nothing was edited are of the regions they were of as well, as far as these still have the same shape: at a threshold
 /// detection may decide otherwise for next to nothing.
@@ -146,12 +149,36 @@ fn settle_regions(kept: &mut Part, before: &Part, untouched: &[bool], near: f64)
             (counterpart(&|&(a, b)| (b == old).then_some(a)) == Some(new)).then_some(old)
         })
         .collect();
+    let old_shape = |region: RegionId| -> Option<&RegionShape> {
+        let old = *pairs.get(region.index())?;
+        Some(&before.regions[old?.index()].shape)
+    };
     let mut settled: Vec<bool> = pairs.iter().map(Option::is_some).collect();
+    // Faces of each that the edit has not touched, less those that it has.
+    let mut surplus = vec![0i64; pairs.len()];
     for (f, &region) in kept.region_of_face.iter().enumerate() {
-        let Some(Some(old)) = region.is_some().then(|| pairs[region.index()]) else { continue };
-        let shape = &before.regions[old.index()].shape;
-        settled[region.index()] &= same_kind(shape, &kept.regions[region.index()].shape)
-            && kept.mesh.corners(FaceId::new(f)).iter().all(|&p| shape.distance(p).abs() <= near);
+        let Some(shape) = old_shape(region) else { continue };
+        let own = &mut settled[region.index()];
+        *own &= same_kind(shape, &kept.regions[region.index()].shape);
+        let t = kept.mesh.triangles[f];
+        let is_untouched = t.iter().all(|v| untouched[v.index()]);
+        if is_untouched {
+            *own &= t.iter().all(|&v| shape.distance(kept.mesh.position(v)).abs() <= near);
+        }
+        surplus[region.index()] += if is_untouched { 1 } else { -1 };
+    }
+    settled.iter_mut().zip(&surplus).for_each(|(settled, &surplus)| *settled &= surplus >= 0);
+    // What was moved off a shape that stays does not belong to it any more.
+    for f in 0..kept.region_of_face.len() {
+        let region = kept.region_of_face[f];
+        let Some(shape) = old_shape(region).filter(|_| settled[region.index()]) else { continue };
+        let is_off = |v: &VertexId| {
+            let most = if kept.frozen[v.index()] { near * ON / NEXT_TO_NOTHING } else { near };
+            !untouched[v.index()] && shape.distance(kept.mesh.position(*v)).abs() > most
+        };
+        if kept.mesh.triangles[f].iter().any(is_off) {
+            kept.region_of_face[f] = RegionId::NONE;
+        }
     }
     for (new, old) in pairs.iter().enumerate() {
         if let Some(old) = old.filter(|_| settled[new]) {

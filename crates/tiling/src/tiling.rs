@@ -1,7 +1,7 @@
 //! The result of the tessellation.
 
 use serde::{Deserialize, Serialize};
-use topipe_mesh::{Difference, FaceId, FeatureKind, Part, RegionId, VertexId};
+use topipe_mesh::{FaceId, FeatureKind, Part, RegionId, VertexId};
 
 /// A tile of a tessellation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -57,17 +57,5 @@ impl Tiling {
     /// Number of tiles.
     pub fn tile_count(&self) -> usize {
         self.sites.len()
-    }
-
-    /// This tiling of `from` on a part that differs from it in shape only: the same tiles, moved along. Where nothing has moved
-    /// it is the same bits.
-    ///
-    /// What [`crate::verify`] checks still holds. Tiles are not made smaller or larger where the surface was stretched, and feature
-    /// edges that `onto` has and `from` has not are not followed.
-    ///
-    /// # Errors
-    /// When the parts differ in more than shape.
-    pub fn carried(&self, from: &Part, onto: &Part) -> Result<Self, Difference> {
-        Ok(Self { part: self.part.carried(from, onto)?, ..self.clone() })
     }
 }

@@ -61,6 +61,11 @@ pub enum Command {
         after_help = "Examples:\n  topipe new part.stl\n  topipe new meshes/part.stl -o part.toml --overwrite"
     )]
     New(NewArguments),
+    /// Write a pipeline for an edited mesh, or for other features, that keeps what the edit does not touch.
+    #[command(
+        after_help = "Examples:\n  topipe edit part.toml part-with-a-rib.stl\n  topipe edit part.toml    (same mesh: then change [stage.smooth] in part-edited.toml)"
+    )]
+    Edit(EditArguments),
     /// Run a pipeline; what is known already is not computed again.
     #[command(
         after_help = "Examples:\n  topipe run part.toml\n  topipe run part.toml --until smooth --force smooth\n  topipe run part.toml --set smooth.iterations=20 --out trial\n  topipe run part.toml --json > events.jsonl"
@@ -457,6 +462,21 @@ pub struct ManArguments {
     /// The folder for the pages [default: the page of topipe goes to stdout].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+}
+
+/// `topipe edit`.
+#[derive(Debug, Args)]
+pub struct EditArguments {
+    /// The pipeline of the part before the edit.
+    pub pipeline: PathBuf,
+    /// The edited mesh, with the triangles of the earlier one in the same order [default: the earlier one].
+    pub mesh: Option<PathBuf>,
+    /// The pipeline to write, in the same folder [default: the mesh's name with .toml, or the pipeline's with -edited].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Replace the pipeline if it exists.
+    #[arg(long)]
+    pub overwrite: bool,
 }
 
 /// `topipe new`.

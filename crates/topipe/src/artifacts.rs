@@ -19,7 +19,7 @@ macro_rules! kinds {
 
 kinds! {
     /// A triangle mesh with its labels, features and provenance.
-    Mesh = "mesh" v 1: topipe_mesh::Part;
+    Mesh = "mesh" v 2: topipe_mesh::Part;
     /// A partition of a mesh into disks.
     Tiling = "tiling" v 1: topipe_tiling::Tiling;
     /// A partition of a mesh into quadrilaterals.
@@ -35,5 +35,5 @@ kinds! {
     /// Compliances under the same loads.
     Stiffness = "stiffness" v 2: topipe_stiffness::Stiffness;
     /// The figures of a validation.
-    Report = "report" v 6: topipe_validation::Report;
+    Report = "report" v 7: topipe_validation::Report;
 }

@@ -64,6 +64,7 @@ fn run(arguments: &Arguments) -> Result<topipe_engine::ExitCode, failure::Failur
         Command::Log(log) => commands::log::run(log),
         Command::Cache(cache) => commands::cache::run(cache),
         Command::New(new) => commands::new::run(new),
+        Command::Edit(edit) => commands::edit::run(edit),
         Command::Man(man) => commands::man::run(man),
         Command::Completions { shell } => commands::completions::run(*shell),
     }

@@ -178,6 +178,8 @@ pub struct SmoothingFigures {
     pub converged: bool,
     /// Signed volume.
     pub volume_mm3: f64,
+    /// Vertices left where the smoothing of an earlier version had put them; the volume is not kept exactly then.
+    pub kept_vertices: u32,
     /// Volume over that of the original, minus 1.
     pub volume_error: f64,
     /// Sum over the vertices of the distance from their first place; `null` where the vertices are not the same.

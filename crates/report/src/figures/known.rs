@@ -1,7 +1,8 @@
 //! What is known about the figures of a report: words, limits, order.
 
 use super::limit::Limit::{
-    self, Above, AtMost, ChangeAtMost, Folds, Known, Loops, None as No, OfBeams, Same, Share, True, Zero,
+    self, Above, AtMost, ChangeAtMost, Folds, Known, Loops, None as No, OfBeams, Same, Share, True,
+    VolumeKept, Zero,
 };
 
 pub(super) struct Figure {
@@ -34,8 +35,9 @@ pub(super) const KNOWN: &[Figure] = &[
         "smoothing.volume_error",
         "Change of volume by smoothing",
         "Volume changed by smoothing",
-        ChangeAtMost(1e-9),
+        VolumeKept,
     ),
+    figure("smoothing.kept_vertices", "Vertices left where an earlier smoothing had put them", "", No),
     figure("smoothing.total_change_mm", "Distance of all vertices from their first places, summed", "", No),
     figure("smoothing.cumulative_change_mm", "Way all vertices have travelled, summed", "", No),
     figure("smoothing.frozen_vertices", "Vertices held in place", "", No),

@@ -11,6 +11,8 @@ pub(super) enum Limit {
     AtMost(f64),
     /// A relative change.
     ChangeAtMost(f64),
+    /// A change of volume by smoothing: none, but for what comes of vertices left where an earlier smoothing had put them.
+    VolumeKept,
     /// A length that must not exceed a share of the diagonal; the figure that says what share it is.
     Share(f64, &'static str),
     Above(f64),
@@ -71,6 +73,10 @@ pub(super) fn judge(report: &Value, value: &Value, limit: &Limit, unit: &str) ->
             let percent = 100.0 * most;
             let percent = if percent < 1e-3 { format!("{percent:.0e}") } else { percent.to_string() };
             (Some(format!("at most \u{b1}{percent}\u{a0}%")), state(x.map(|x| x.abs() <= *most)))
+        }
+        Limit::VolumeKept => {
+            let kept = lookup(report, "smoothing.kept_vertices").and_then(Value::as_u64).unwrap_or(0);
+            judge(report, value, &Limit::ChangeAtMost(if kept > 0 { 1e-3 } else { 1e-9 }), unit)
         }
         Limit::Share(most, path) => match (x, lookup(report, path).and_then(Value::as_f64)) {
             (Some(x), Some(share)) if share > 0.0 => {

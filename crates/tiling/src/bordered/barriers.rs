@@ -92,15 +92,22 @@ fn relative(surface: &Surface, a: VertexId, b: VertexId) -> f64 {
     surface.position(a).distance(surface.position(b)) / size
 }
 
-/// The segments of a surface; splits edges where corners are to lie between vertices.
-pub(crate) fn segments(surface: &mut Surface) -> Vec<Segment> {
+/// The segments of a surface, those first that are `given`; splits edges where corners are to lie between vertices, but none of these.
+pub(crate) fn segments(surface: &mut Surface, given: Vec<Segment>) -> Vec<Segment> {
     let mut kinds = barrier_edges(surface);
+    let mut ends = BTreeSet::new();
+    for segment in &given {
+        for pair in segment.path.windows(2) {
+            kinds.remove(&key(pair[0], pair[1]));
+        }
+        ends.extend([segment.path[0], segment.path[segment.path.len() - 1]]);
+    }
     loop {
         let graph = graph(&kinds);
-        let curves = curves(surface, &graph, &kinds);
-        let drop = chips(surface, &graph, &curves);
+        let curves = curves(surface, &graph, &kinds, &ends);
+        let drop = chips(surface, &graph, &curves, &ends);
         if drop.is_empty() {
-            let mut segments = Vec::new();
+            let mut segments = given;
             for curve in curves {
                 cut(surface, curve, &mut segments);
             }
@@ -154,8 +161,13 @@ fn turns(surface: &Surface, graph: &Graph, v: VertexId, ends: [VertexId; 2]) -> 
     arm.contains(&v) || turn(arm[0], arm[1]) > CORNER
 }
 
-fn curves(surface: &Surface, graph: &Graph, kinds: &BTreeMap<[VertexId; 2], FeatureKind>) -> Vec<Curve> {
-    let mut node: BTreeSet<VertexId> = BTreeSet::new();
+fn curves(
+    surface: &Surface,
+    graph: &Graph,
+    kinds: &BTreeMap<[VertexId; 2], FeatureKind>,
+    ends: &BTreeSet<VertexId>,
+) -> Vec<Curve> {
+    let mut node: BTreeSet<VertexId> = ends.iter().copied().filter(|v| graph.contains_key(v)).collect();
     for (&v, list) in graph {
         let is_node = match list[..] {
             [a, b] => beside(surface, a, v) != beside(surface, v, b) || turns(surface, graph, v, [a, b]),
@@ -195,8 +207,8 @@ fn curves(surface: &Surface, graph: &Graph, kinds: &BTreeMap<[VertexId; 2], Feat
     curves
 }
 
-/// Curves off the regions that are too short to be followed, or dangle.
-fn chips(surface: &Surface, graph: &Graph, curves: &[Curve]) -> Vec<usize> {
+/// Curves off the regions that are too short to be followed, or dangle; those that go on as segments from their `ends` do neither.
+fn chips(surface: &Surface, graph: &Graph, curves: &[Curve], ends: &BTreeSet<VertexId>) -> Vec<usize> {
     let loose = |c: &Curve| c.regions == [RegionId::NONE; 2] && c.kind != FeatureKind::User;
     let lengths: Vec<f64> =
         curves.iter().map(|c| c.path.windows(2).map(|w| relative(surface, w[0], w[1])).sum()).collect();
@@ -220,14 +232,15 @@ fn chips(surface: &Surface, graph: &Graph, curves: &[Curve]) -> Vec<usize> {
     let mut total = vec![0.0; curves.len()];
     for (i, curve) in curves.iter().enumerate() {
         let r = find(&mut parent, i);
-        total[r] += if loose(curve) { lengths[i] } else { f64::INFINITY };
+        let goes_on = [curve.path[0], curve.path[curve.path.len() - 1]].iter().any(|v| ends.contains(v));
+        total[r] += if loose(curve) && !goes_on { lengths[i] } else { f64::INFINITY };
     }
     (0..curves.len())
         .filter(|&i| {
             let curve = &curves[i];
             let dangling = [curve.path[0], curve.path[curve.path.len() - 1]]
                 .iter()
-                .any(|v| graph.get(v).is_some_and(|list| list.len() == 1));
+                .any(|v| graph.get(v).is_some_and(|list| list.len() == 1) && !ends.contains(v));
             loose(curve) && (total[find(&mut parent, i)] < 2.0 * CHIP || (dangling && lengths[i] < CHIP))
         })
         .collect()

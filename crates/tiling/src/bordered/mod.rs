@@ -21,11 +21,14 @@ mod polygons;
 mod recheck;
 mod regions;
 mod repair;
+mod rest;
 mod shortcomings;
 mod sites;
 mod sizes;
 mod strips;
 mod surface;
+
+pub use rest::{Layout, NotTiled, Rest, tile_rest};
 
 use crate::{FeatureSegment, Parameters, TileId, Tiling, TilingError};
 use barriers::Segment;
@@ -49,6 +52,10 @@ pub(crate) enum Seed {
 pub(crate) struct Construction<'a> {
     pub(crate) surface: Surface,
     pub(crate) segments: Vec<Segment>,
+    /// The first of them, which are not to be halved as others rely on them; those with the same number have one tile beside them.
+    pub(crate) given: Vec<Option<u32>>,
+    /// Those of them that were to be halved nevertheless.
+    pub(crate) asked: Vec<usize>,
     /// Per vertex: a segment ends here.
     pub(crate) is_node: Vec<bool>,
     /// Strips first, then sites.
@@ -120,10 +127,7 @@ fn tile_scaled(
     scale: f64,
 ) -> Result<Tiling, TilingError> {
     let refiner = Refiner::new(part)?;
-    let wall = 2.0 * part.mesh.volume().abs() / part.mesh.area();
-    let least_area =
-        if parameters.follow_features { (parameters.least_region * wall).powi(2) } else { f64::INFINITY };
-    let choice = regions::choose(&refiner, least_area);
+    let choice = regions::choose(&refiner, least_area(part, parameters));
     let region_of_face = choice.region;
     let (filled, depth) = choice.filled;
     if filled > 0 {
@@ -147,39 +151,64 @@ fn tile_scaled(
         // Hexagonal tiles of equal area.
         (2.0 * free_area.max(1e-3 * part.mesh.area()) / (3f64.sqrt() * f64::from(parameters.tiles))).sqrt()
     } else {
-        parameters.tile_size * wall
+        parameters.tile_size * wall(part)
     };
     let spacing = scale * size;
-    let bends = match parameters.bend {
-        bend if bend > 0.0 => sizes::factors(&refiner, &region_of_face, spacing, bend.to_radians()),
-        _ => vec![1.0; part.mesh.face_count()],
-    };
+    let bends = bends(&refiner, &region_of_face, spacing, parameters);
     let factor = |f: usize| sizes.and_then(|s| s.get(f)).copied().filter(|s| *s > 0.0).unwrap_or(1.0);
     let size: Vec<f64> = (0..part.mesh.face_count()).map(|f| spacing * factor(f) * bends[f]).collect();
     let mut surface = Surface::new(refiner, region_of_face, size);
-    surface.densify(parameters.faces_per_tile, progress)?;
-    let segments = if parameters.follow_features { barriers::segments(&mut surface) } else { Vec::new() };
+    surface.densify(parameters.faces_per_tile, RegionId::NONE, progress)?;
+    let segments = match parameters.follow_features {
+        true => barriers::segments(&mut surface, Vec::new()),
+        false => Vec::new(),
+    };
     progress.remark(&format!("size {spacing:.3} mm, {} segments of features", segments.len()));
     let mut construction = Construction {
         is_node: Vec::new(),
         surface,
         segments,
+        given: Vec::new(),
+        asked: Vec::new(),
         seeds: Vec::new(),
         strip_of_side: Vec::new(),
         parameters,
         progress,
     };
-    construction.lay_strips();
-    construction.fill()?;
-    for _ in 0..parameters.lloyd_rounds {
-        progress.check()?;
-        construction.relax();
-    }
-    construction.repair()?;
+    construction.tile()?;
     Ok(construction.finish())
 }
 
+/// The mean thickness of a part, mm: twice its volume over its area.
+fn wall(part: &Part) -> f64 {
+    2.0 * part.mesh.volume().abs() / part.mesh.area()
+}
+
+/// Smaller regions are not taken out, mm2.
+fn least_area(part: &Part, parameters: &Parameters) -> f64 {
+    if parameters.follow_features { (parameters.least_region * wall(part)).powi(2) } else { f64::INFINITY }
+}
+
+/// Factors on the size of tiles, per face, where the surface bends.
+fn bends(refiner: &Refiner, region: &[RegionId], spacing: f64, parameters: &Parameters) -> Vec<f64> {
+    match parameters.bend {
+        bend if bend > 0.0 => sizes::factors(refiner, region, spacing, bend.to_radians()),
+        _ => vec![1.0; refiner.part().mesh.face_count()],
+    }
+}
+
 impl Construction<'_> {
+    /// Strips, sites, and repair.
+    fn tile(&mut self) -> Result<(), TilingError> {
+        self.lay_strips();
+        self.fill()?;
+        for _ in 0..self.parameters.lloyd_rounds {
+            self.progress.check()?;
+            self.relax();
+        }
+        self.repair()
+    }
+
     pub(crate) fn faces_by_tile(&self) -> Vec<Vec<FaceId>> {
         let mut faces = vec![Vec::new(); self.seeds.len()];
         for (f, &owner) in self.surface.owner.iter().enumerate() {

@@ -318,6 +318,8 @@ mod tests {
         let mut construction = Construction {
             surface,
             segments: Vec::new(),
+            given: Vec::new(),
+            asked: Vec::new(),
             is_node: Vec::new(),
             seeds: vec![Seed::Piece; 2],
             strip_of_side: Vec::new(),

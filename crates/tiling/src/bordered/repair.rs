@@ -249,6 +249,10 @@ impl Construction<'_> {
     /// Halves the longest segment along some faces; false if there is none.
     fn halve_segment_of(&mut self, faces: &[FaceId]) -> bool {
         let Some((_, segment)) = self.longest_segment(faces) else { return false };
+        if segment < self.given.len() {
+            self.asked.push(segment);
+            return false;
+        }
         match self.segments[segment].halve(&mut self.surface) {
             Some(second) => {
                 self.segments.push(second);

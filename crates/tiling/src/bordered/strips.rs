@@ -7,6 +7,7 @@
 
 use super::surface::NONE;
 use super::{Construction, Seed};
+use std::collections::BTreeMap;
 use topipe_mesh::{FaceId, HalfEdgeId, VertexId};
 
 /// A corner up to here becomes the corner of one tile: a quad's corner should not be wider.
@@ -45,6 +46,11 @@ impl Construction<'_> {
             sectors.push(Sector { fan, sides, angle });
         }
         sectors
+    }
+
+    /// The number that a side of a given segment has in common with others.
+    fn number_of(&self, side: u32) -> Option<u32> {
+        self.given.get(side as usize / 2).copied().flatten()
     }
 
     /// Afterwards each free face touches at most one barrier vertex or one barrier edge.
@@ -133,8 +139,17 @@ impl Construction<'_> {
         }
         self.separate_barriers();
 
-        // Sides that share a corner of a tile belong to one strip.
+        // Sides that share a corner of a tile belong to one strip, and those that are to.
         let mut parent: Vec<u32> = (0..2 * self.segments.len() as u32).collect();
+        let mut first_of: BTreeMap<u32, u32> = BTreeMap::new();
+        for h in self.surface.half_edges() {
+            let side = self.surface.side[h.index()];
+            if let Some(number) = self.number_of(side).filter(|_| self.surface.is_free(h.face())) {
+                let first = *first_of.entry(number).or_insert(side);
+                let [a, b] = [first, side].map(|s| root(&mut parent, s));
+                parent[a.max(b) as usize] = a.min(b);
+            }
+        }
         let nodes: Vec<VertexId> =
             (0..self.is_node.len()).filter(|&v| self.is_node[v]).map(VertexId::new).collect();
         for &v in &nodes {
@@ -175,7 +190,9 @@ impl Construction<'_> {
                 let sector = &mut sectors[i];
                 let [a, b] = sector.sides.map(|s| self.strip_of_side[s as usize]);
                 let node = self.is_node.get(v.index()) == Some(&true);
-                let shares: Vec<(u32, usize)> = if !node || (a == b && sector.angle < ONE_TILE) {
+                let [one, other] = sector.sides.map(|s| self.number_of(s));
+                let together = a == b && (sector.angle < ONE_TILE || (one.is_some() && one == other));
+                let shares: Vec<(u32, usize)> = if !node || together {
                     vec![(a, sector.fan.len())]
                 } else if sector.angle < TWO_TILES && a != b {
                     let last = sector.fan.len() - 1;

@@ -134,8 +134,14 @@ impl Surface {
         split.vertex
     }
 
-    /// Splits long edges of the free surface until tiles have enough faces, longest edges first within each sweep.
-    pub(crate) fn densify(&mut self, faces_per_tile: u32, progress: &Progress) -> Result<(), TilingError> {
+    /// Splits long edges of the free surface until tiles have enough faces, longest edges first within each sweep; none of faces of the
+    /// region `kept`.
+    pub(crate) fn densify(
+        &mut self,
+        faces_per_tile: u32,
+        kept: RegionId,
+        progress: &Progress,
+    ) -> Result<(), TilingError> {
         // A tile covers sqrt(3)/2 size^2; equilateral triangles of that number have this edge length. Real triangles
         // scatter about it, so only edges twice as long are split.
         let longest = 2.0 * (2.0 / f64::from(faces_per_tile)).sqrt();
@@ -145,7 +151,8 @@ impl Surface {
                 let twin = self.refiner.twin(h);
                 let sizes = [h.face(), twin.face()]
                     .map(|f| if self.is_free(f) { self.size[f.index()] } else { f64::INFINITY });
-                self.length(h) / sizes[0].min(sizes[1])
+                let kept = [h.face(), twin.face()].iter().any(|f| self.region[f.index()] == kept);
+                if kept { 0.0 } else { self.length(h) / sizes[0].min(sizes[1]) }
             };
             let mut long: Vec<(f64, HalfEdgeId)> = self
                 .half_edges()

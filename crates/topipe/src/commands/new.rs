@@ -235,7 +235,7 @@ impl Looked {
 }
 
 /// The stem of the file in letters that a folder's name may have.
-fn pipeline_name(mesh: &Path) -> String {
+pub(super) fn pipeline_name(mesh: &Path) -> String {
     let stem = mesh.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let name: String =
         stem.chars().map(|c| if c.is_alphanumeric() || matches!(c, '-' | '_') { c } else { '-' }).collect();
@@ -243,7 +243,7 @@ fn pipeline_name(mesh: &Path) -> String {
 }
 
 /// `mesh` as it is written in a pipeline at `output`.
-fn path_from(output: &Path, mesh: &Path) -> String {
+pub(super) fn path_from(output: &Path, mesh: &Path) -> String {
     let folder = output.parent().unwrap_or(Path::new(""));
     let relative = match mesh.strip_prefix(folder) {
         Ok(inside) => inside.to_owned(),

@@ -2,6 +2,7 @@
 
 mod beams;
 mod import;
+mod layout_update;
 mod quad_matching;
 mod remeshing;
 mod simp;
@@ -26,6 +27,7 @@ pub fn registry() -> Registry {
         .with_stage(smoothing_study::SmoothingStudy)
         .with_stage(tiling::Tiling)
         .with_stage(quad_matching::QuadMatching)
+        .with_stage(layout_update::LayoutUpdate)
         .with_stage(spline_fit::SplineFit)
         .with_stage(skeleton::Skeleton)
         .with_stage(beams::Beams)
@@ -63,6 +65,8 @@ mod tests {
             (Value::Null, "boolean") => "true".into(),
             (Value::Null, "integer") => "7".into(),
             (Value::Null, "number") => "7.5".into(),
+            (Value::Object(_), _) if field.name == "tiles" => "{ tile_size = 2.5 }".into(),
+            (Value::Object(_), _) if field.name == "quads" => "{ snap = 0.2 }".into(),
             (Value::Array(_), _) if field.name == "weights" => "[1.0, 1.0, 1.0, 1.0]".into(),
             (Value::Array(_), "list of number") => "[0.375]".into(),
             (Value::Array(_), _) if field.name == "non_design" => {
@@ -247,6 +251,6 @@ mod tests {
         assert!(versions.iter().all(|version| version.len() == 16));
         versions.sort();
         versions.dedup();
-        assert_eq!(versions.len(), 13);
+        assert_eq!(versions.len(), 14);
     }
 }

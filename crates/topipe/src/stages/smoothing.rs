@@ -3,7 +3,7 @@
 use super::bad_value;
 use crate::artifacts::Mesh;
 use topipe_engine::{BadValue, InputPort, Stage, StageContext, StageError};
-use topipe_smoothing::{Parameters, SmoothingError, smooth};
+use topipe_smoothing::{Earlier, Parameters, SmoothingError, smooth, smooth_after};
 
 /// Smooths a mesh.
 pub(super) struct Smoothing;
@@ -20,7 +20,14 @@ impl Stage for Smoothing {
     }
 
     fn inputs(&self) -> Vec<InputPort> {
-        vec![InputPort::required::<Mesh>("input", "The mesh.")]
+        vec![
+            InputPort::required::<Mesh>("input", "The mesh."),
+            InputPort::optional::<Mesh>(
+                "earlier",
+                "What an earlier version of the mesh was smoothed to: what was not edited since stays as it is there.",
+            ),
+            InputPort::optional::<Mesh>("earlier_input", "That earlier version, before it was smoothed."),
+        ]
     }
 
     fn check(&self, parameters: &Parameters) -> Result<(), BadValue> {
@@ -43,7 +50,19 @@ impl Stage for Smoothing {
                  put a stage of kind \"remeshing\" before this one"
             ));
         }
-        smooth(&part, parameters, context.progress()).map_err(|error| match error {
+        let earlier =
+            [context.optional_input::<Mesh>("earlier")?, context.optional_input::<Mesh>("earlier_input")?];
+        let smoothed = match &earlier {
+            [None, None] => smooth(&part, parameters, context.progress()),
+            [Some(smoothed), Some(original)] => {
+                smooth_after(&part, Earlier { original, smoothed }, parameters, context.progress())
+            }
+            _ => {
+                let message = "`earlier` and `earlier_input` belong together: name both, or none";
+                return Err(StageError::BadParameter(message.into()));
+            }
+        };
+        smoothed.map_err(|error| match error {
             SmoothingError::Interrupted(_) => StageError::Interrupted,
             SmoothingError::Parameter { .. } => StageError::BadParameter(error.to_string()),
             SmoothingError::Diverged { .. } | SmoothingError::VolumeOutOfReach { .. } => {

@@ -24,6 +24,7 @@ pub(crate) fn figures(original: &Part, part: &Part) -> SmoothingFigures {
         iterations: record.iterations,
         converged: record.converged,
         volume_mm3,
+        kept_vertices: record.kept,
         volume_error: volume_mm3 / before - 1.0,
         total_change_mm,
         cumulative_change_mm: record.cumulative_change,

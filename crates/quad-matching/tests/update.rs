@@ -1,0 +1,205 @@
+//! An edit leaves the layout elsewhere as it was.
+
+use std::collections::BTreeMap;
+use topipe_mesh::import::{ImportOptions, Source, read_source};
+use topipe_mesh::{DVec3, Part, Provenance};
+use topipe_progress::{Progress, Recorder};
+use topipe_quad_matching::{
+    Earlier, QuadLayout, QuadMatchingError, UpdateParameters, match_quads, update, verify,
+};
+use topipe_smoothing::features::{Action, FeatureOverride, Shape, Space};
+use topipe_smoothing::{Parameters, smooth, smooth_after};
+use topipe_tiling::{Tiling, tile};
+
+/// What a run with default parameters makes of a fixture.
+struct Run {
+    original: Part,
+    smoothed: Part,
+    tiling: Tiling,
+    layout: QuadLayout,
+}
+
+fn run(name: &str) -> Run {
+    let place = format!("{}/../../fixtures/{name}/{name}", env!("CARGO_MANIFEST_DIR"));
+    let silent = Progress::silent();
+    let [bytes, labels] =
+        [".stl", ".labels.csv"].map(|ending| std::fs::read(place.clone() + ending).unwrap());
+    let source = Source { labels: Some(("labels.csv", &labels)), ..Source::new("part.stl", &bytes) };
+    let original = read_source(&source, &ImportOptions::default(), &silent).unwrap();
+    let smoothed = smooth(&original, &Parameters::default(), &silent).unwrap();
+    let tiling = tile(&smoothed, &Default::default(), &silent).unwrap();
+    let layout = match_quads(&tiling, &Default::default(), &silent).unwrap();
+    Run { original, smoothed, tiling, layout }
+}
+
+impl Run {
+    /// The layout of the smoothed part as it is after an edit, and what was said.
+    fn updated(&self, smoothed: &Part) -> (QuadLayout, Recorder) {
+        let recorder = std::sync::Arc::new(Recorder::default());
+        let earlier = Earlier { part: &self.smoothed, tiling: Some(&self.tiling), layout: &self.layout };
+        let progress = Progress::new(recorder.clone());
+        let layout = update(smoothed, earlier, &Default::default(), &progress).unwrap();
+        drop(progress);
+        assert_eq!(verify(&layout), Vec::<String>::new());
+        (layout, std::sync::Arc::into_inner(recorder).unwrap())
+    }
+
+    /// The smoothed part after an edit.
+    fn after(&self, original: &Part, parameters: &Parameters) -> Part {
+        let earlier = topipe_smoothing::Earlier { original: &self.original, smoothed: &self.smoothed };
+        smooth_after(original, earlier, parameters, &Progress::silent()).unwrap()
+    }
+
+    /// The original with a bump around a point.
+    fn bumped(&self, center: DVec3, radius: f64, height: f64) -> Part {
+        let mut edited = self.original.clone();
+        let edge = edited.mesh.mean_edge_length();
+        for p in &mut edited.mesh.positions {
+            let d = p.distance(center) / (radius * edge);
+            if d < 1.0 {
+                *p += DVec3::new(0.6, 0.0, 0.8) * height * edge * (1.0 - d * d).powi(2);
+            }
+        }
+        edited
+    }
+}
+
+/// The faces of each quad as points.
+fn shapes(layout: &QuadLayout) -> Vec<Vec<[u64; 9]>> {
+    let mut shapes = vec![Vec::new(); layout.quads.len()];
+    for f in layout.part.mesh.faces() {
+        if let Some(shape) = shapes.get_mut(layout.quad_of_face[f.index()] as usize) {
+            let corners = layout.part.mesh.corners(f).map(|p| p.to_array().map(f64::to_bits));
+            shape.push(corners.concat().try_into().unwrap());
+        }
+    }
+    shapes
+}
+
+/// How many quads of the second are bit for bit quads of the first.
+fn common(before: &QuadLayout, after: &QuadLayout) -> usize {
+    let known: BTreeMap<Vec<[u64; 9]>, ()> = shapes(before).into_iter().map(|shape| (shape, ())).collect();
+    shapes(after).into_iter().filter(|shape| known.contains_key(shape)).count()
+}
+
+#[test]
+fn without_an_edit_all_is_kept() {
+    for name in ["bracket", "y-form"] {
+        let run = run(name);
+        let (same, recorder) = run.updated(&run.smoothed);
+        assert_eq!(recorder.warnings(), Vec::<String>::new());
+        // Provenance refers to the part, not to the tiling.
+        let provenance = same.part.provenance.clone();
+        assert_ne!(provenance, run.layout.part.provenance);
+        let part = Part { provenance, ..run.layout.part.clone() };
+        assert_eq!(same, QuadLayout { part, ..run.layout }, "{name}");
+    }
+}
+
+/// Bumps on free surface, over borders of flat faces and beside holes.
+#[test]
+fn an_edit_changes_the_quads_around_it() {
+    for (name, bumps) in [
+        ("bracket", [(0.1, 3.0, 0.3), (0.3, 3.0, 0.3), (0.7, 6.0, 1.0)]),
+        ("support", [(0.1, 6.0, 1.0), (0.5, 3.0, 0.3), (0.9, 6.0, 1.0)]),
+        ("cantilever", [(0.1, 3.0, 0.3), (0.7, 3.0, 0.3), (0.9, 6.0, 1.0)]),
+    ] {
+        let run = run(name);
+        for (share, radius, height) in bumps {
+            let n = run.original.mesh.vertex_count();
+            let center = run.original.mesh.positions[(share * n as f64) as usize];
+            let edited = run.bumped(center, radius, height);
+            let smoothed = run.after(&edited, &Parameters::default());
+            let (layout, recorder) = run.updated(&smoothed);
+            assert_eq!(recorder.warnings(), Vec::<String>::new(), "{name} {share}");
+            let (all, same) = (run.layout.quads.len(), common(&run.layout, &layout));
+            assert!(10 * same > 7 * all, "{name} {share}: {same} of {all}");
+            assert!(layout.quads.len() < 3 * all / 2, "{name} {share}: {} for {all}", layout.quads.len());
+            assert!(layout.outside_gates() <= 2, "{name} {share}");
+            // Its mesh is that of the part, but for where it is cut.
+            let [own, part] = [&layout.part.mesh, &smoothed.mesh];
+            assert!((own.volume() / part.volume() - 1.0).abs() < 1e-9);
+            assert!((own.area() / part.area() - 1.0).abs() < 1e-9);
+            for (v, source) in own.vertices().zip(&layout.part.provenance) {
+                let p = match *source {
+                    Provenance::Vertex(v) => part.position(v),
+                    Provenance::Edge { ends: [a, b], t } => part.position(a).lerp(part.position(b), t),
+                    Provenance::Face { face, weights: [s, t] } => {
+                        let [a, b, c] = part.corners(face);
+                        a * (1.0 - s - t) + b * s + c * t
+                    }
+                };
+                assert!(p.distance(own.position(v)) < 1e-9 * part.diagonal());
+            }
+        }
+    }
+}
+
+/// The same bits for any number of threads.
+#[test]
+fn threads_change_nothing() {
+    let run = run("y-form");
+    let n = run.original.mesh.vertex_count();
+    let edited = run.bumped(run.original.mesh.positions[n / 10], 6.0, 1.0);
+    let smoothed = run.after(&edited, &Parameters::default());
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| run.updated(&smoothed).0)
+    };
+    assert_eq!(with(1), with(3));
+}
+
+/// A hole that is given up is covered with quads, and the others stay.
+#[test]
+fn a_dropped_hole_is_laid_out_and_nothing_else() {
+    let run = run("bracket");
+    let space =
+        Space::Cylinder { point: [-53.0, -34.0, 0.0], axis: [0.0, 0.0, 1.0], length: 12.0, diameter: 6.5 };
+    let drop = FeatureOverride { action: Action::Drop, shape: Shape::Hole, space, diameter: None };
+    let smoothed = run.after(&run.original, &Parameters { features: vec![drop], ..Parameters::default() });
+    assert_eq!(smoothed.regions.len(), run.smoothed.regions.len() - 1);
+    let (layout, recorder) = run.updated(&smoothed);
+    assert_eq!(recorder.warnings(), Vec::<String>::new());
+    assert_eq!(layout.region_faces.len(), run.layout.region_faces.len() - 1);
+    let (all, same) = (run.layout.quads.len(), common(&run.layout, &layout));
+    assert!(10 * same > 9 * all, "{same} of {all}");
+    // And back: an update of what was updated, whose provenance refers to the part already.
+    let earlier = Earlier { part: &smoothed, tiling: None, layout: &layout };
+    let recorder = std::sync::Arc::new(Recorder::default());
+    let back = update(&run.smoothed, earlier, &Default::default(), &Progress::new(recorder.clone())).unwrap();
+    assert_eq!(recorder.warnings(), Vec::<String>::new());
+    assert_eq!(verify(&back), Vec::<String>::new());
+    assert_eq!(back.region_faces.len(), run.layout.region_faces.len());
+    assert!(10 * common(&run.layout, &back) > 9 * all);
+}
+
+#[test]
+fn what_does_not_fit_is_laid_out_anew_and_said() {
+    let run = run("y-form");
+    let fresh = |part: &Part| {
+        let tiling = tile(part, &Default::default(), &Progress::silent()).unwrap();
+        match_quads(&tiling, &Default::default(), &Progress::silent()).unwrap()
+    };
+    let mut other = run.smoothed.clone();
+    other.mesh.triangles[7].rotate_left(1);
+    let (layout, recorder) = run.updated(&other);
+    assert!(recorder.warnings()[0].contains("do not join the same vertices"), "{:?}", recorder.warnings());
+    assert_eq!(layout, fresh(&other));
+    // The layout of another mesh, and a tiling that is not its own.
+    let support = self::run("support");
+    for (tiling, layout) in [(Some(&support.tiling), &run.layout), (None, &support.layout)] {
+        let earlier = Earlier { part: &run.smoothed, tiling, layout };
+        let recorder = std::sync::Arc::new(Recorder::default());
+        let progress = Progress::new(recorder.clone());
+        let layout = update(&run.smoothed, earlier, &Default::default(), &progress).unwrap();
+        assert!(recorder.warnings()[0].contains("made of another mesh"), "{:?}", recorder.warnings());
+        assert_eq!(layout, fresh(&run.smoothed));
+    }
+    let parameters = UpdateParameters {
+        quads: topipe_quad_matching::Parameters { snap: 0.9, ..Default::default() },
+        ..Default::default()
+    };
+    let earlier = Earlier { part: &run.smoothed, tiling: Some(&run.tiling), layout: &run.layout };
+    let error = update(&run.smoothed, earlier, &parameters, &Progress::silent()).unwrap_err();
+    assert!(matches!(error, QuadMatchingError::Parameter { field: "snap", .. }), "{error}");
+}
