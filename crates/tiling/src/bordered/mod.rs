@@ -158,7 +158,7 @@ fn tile_scaled(
     let factor = |f: usize| sizes.and_then(|s| s.get(f)).copied().filter(|s| *s > 0.0).unwrap_or(1.0);
     let size: Vec<f64> = (0..part.mesh.face_count()).map(|f| spacing * factor(f) * bends[f]).collect();
     let mut surface = Surface::new(refiner, region_of_face, size);
-    surface.densify(parameters.faces_per_tile, RegionId::NONE, progress)?;
+    surface.densify(parameters.faces_per_tile, None, progress)?;
     let segments = match parameters.follow_features {
         true => barriers::segments(&mut surface, Vec::new()),
         false => Vec::new(),

@@ -76,7 +76,7 @@ pub fn tile_rest(rest: Rest<'_>, parameters: &Parameters, progress: &Progress) -
     let parameters = &Parameters { method: Method::Bordered, ..parameters.clone() };
     let refiner = Refiner::new(part).map_err(TilingError::from)?;
     let mut surface = Surface::new(refiner, region_of_face, size);
-    surface.densify(parameters.faces_per_tile, kept, progress)?;
+    surface.densify(parameters.faces_per_tile, Some(kept), progress)?;
     let (segments, given) = given
         .into_iter()
         .map(|(FeatureSegment { path, kind }, number)| (Segment { path, kind }, number))

@@ -139,7 +139,7 @@ impl Surface {
     pub(crate) fn densify(
         &mut self,
         faces_per_tile: u32,
-        kept: RegionId,
+        kept: Option<RegionId>,
         progress: &Progress,
     ) -> Result<(), TilingError> {
         // A tile covers sqrt(3)/2 size^2; equilateral triangles of that number have this edge length. Real triangles
@@ -151,7 +151,7 @@ impl Surface {
                 let twin = self.refiner.twin(h);
                 let sizes = [h.face(), twin.face()]
                     .map(|f| if self.is_free(f) { self.size[f.index()] } else { f64::INFINITY });
-                let kept = [h.face(), twin.face()].iter().any(|f| self.region[f.index()] == kept);
+                let kept = [h.face(), twin.face()].iter().any(|f| Some(self.region[f.index()]) == kept);
                 if kept { 0.0 } else { self.length(h) / sizes[0].min(sizes[1]) }
             };
             let mut long: Vec<(f64, HalfEdgeId)> = self
