@@ -156,6 +156,11 @@ scale sizes="30000 100000 300000 1000000":
             --cache target/scale/cache --out target/scale/out-$n || exit 1; \
     done
 
+# How much of a fit is made again after edits of the nine examples.
+edits *parts:
+    cargo build --release
+    python3 pipelines/studies/edits.py target/release/topipe {{parts}}
+
 # Times of elastic solutions and of an optimization: a million cells, full and of bars in void; the whole cantilever.
 stiffness-speed:
     cargo build --release -p topipe

@@ -26,8 +26,9 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// Three bars of voxels that meet in a corner, a little shaken: small, closed, and with something to smooth.
-fn part_stl() -> String {
+/// Three bars of voxels that meet in a corner, a little shaken: small, closed, and with something to smooth. With a rib some of its
+/// vertices are a little higher.
+fn part_stl(rib: f64) -> String {
     let mut cells: BTreeSet<[i32; 3]> = BTreeSet::new();
     for i in -2..24 {
         for (a, b) in (-2..3).flat_map(|a| (-2..3).map(move |b| (a, b))).filter(|(a, b)| a * a + b * b <= 5) {
@@ -38,7 +39,8 @@ fn part_stl() -> String {
         let hash =
             p[0].wrapping_mul(73_856_093) ^ p[1].wrapping_mul(19_349_663) ^ p[2].wrapping_mul(83_492_791);
         let shift = |k: usize| 0.3 * (f64::from(hash >> (7 * k) & 127) / 127.0 - 0.5);
-        [0, 1, 2].map(|k| f64::from(p[k]) + shift(k))
+        let lift = if (10..14).contains(&p[0]) && p[2] == 3 { rib } else { 0.0 };
+        [0, 1, 2].map(|k| f64::from(p[k]) + shift(k) + if k == 2 { lift } else { 0.0 })
     };
     let mut text = "solid part\n".to_owned();
     for cell in &cells {
@@ -111,10 +113,11 @@ fn commands(text: &str, readme: bool) -> Vec<Vec<String>> {
 /// A folder with the part, a pipeline for it, and what the README runs.
 fn workshop() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("part.stl"), part_stl()).unwrap();
+    std::fs::write(folder.path().join("part.stl"), part_stl(0.0)).unwrap();
+    std::fs::write(folder.path().join("part-with-a-rib.stl"), part_stl(0.4)).unwrap();
     std::fs::create_dir(folder.path().join("pipelines")).unwrap();
     std::fs::create_dir(folder.path().join("meshes")).unwrap();
-    std::fs::write(folder.path().join("meshes/part.stl"), part_stl()).unwrap();
+    std::fs::write(folder.path().join("meshes/part.stl"), part_stl(0.0)).unwrap();
     run(folder.path(), &["new", "part.stl"].map(str::to_owned), "set-up");
     for example in ["bracket", "filleted-block"] {
         let pipeline = folder.path().join(format!("pipelines/{example}.toml"));
@@ -126,7 +129,8 @@ fn workshop() -> tempfile::TempDir {
 
 fn run(folder: &Path, words: &[String], page: &str) {
     // Pipelines are written anew on every page.
-    let overwrite = words.first().is_some_and(|word| word == "new") && !words.contains(&"--overwrite".into());
+    let overwrite = words.first().is_some_and(|word| word == "new" || word == "edit")
+        && !words.contains(&"--overwrite".into());
     let output = Command::new(env!("CARGO_BIN_EXE_topipe"))
         .current_dir(folder)
         .env("TOPIPE_CACHE", folder.join("cache"))
@@ -243,7 +247,7 @@ mod own_stage;
 fn the_stage_of_the_guide_mirrors_a_part() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = folder.path().join("part.stl");
-    std::fs::write(&mesh, part_stl()).unwrap();
+    std::fs::write(&mesh, part_stl(0.0)).unwrap();
     let record = own_stage::mirror_file(&mesh, folder.path()).unwrap();
     assert_eq!(record.code, topipe_engine::ExitCode::Done);
     let read = |path: &Path| {

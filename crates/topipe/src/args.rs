@@ -63,7 +63,7 @@ pub enum Command {
     New(NewArguments),
     /// Write a pipeline for an edited mesh, or for other features, that keeps what the edit does not touch.
     #[command(
-        after_help = "Examples:\n  topipe edit part.toml part-with-a-rib.stl\n  topipe edit part.toml    (same mesh: then change [stage.smooth] in part-edited.toml)"
+        after_help = "Examples:\n  topipe edit part.toml part-with-a-rib.stl\n  topipe edit part.toml      # the same mesh; change the features in part-edited.toml"
     )]
     Edit(EditArguments),
     /// Run a pipeline; what is known already is not computed again.

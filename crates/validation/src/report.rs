@@ -188,7 +188,7 @@ pub struct SmoothingFigures {
     pub cumulative_change_mm: f64,
     /// Vertices marked as frozen.
     pub frozen_vertices: usize,
-    /// Those of them that are not where they were, bit for bit: 0.
+    /// Those of them that are not where they were, bit for bit: 0. Where vertices were kept, by more than counts as an edit.
     pub frozen_moved: usize,
     /// Holes: hollow cylinders that go around their axis by 300 degrees or more.
     pub holes: Vec<Hole>,

@@ -1,6 +1,7 @@
 //! Joins what is kept of a layout to the layout of the rest.
 
 use super::carried::Carried;
+use super::tiles::spokes;
 use crate::{MacroEdge, QuadLayout, RegionFace, Side};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeSet;
@@ -47,7 +48,6 @@ pub(super) fn splice(
     }
     same.iter().flatten().for_each(|(e, _)| stays[*e as usize] = true);
 
-    // Vertices and edges of the earlier layout first, in their order.
     let mut vertex_of: FxHashMap<VertexId, u32> = FxHashMap::default();
     let mut vertices = Vec::new();
     let mut number = |v: VertexId, vertices: &mut Vec<VertexId>| {
@@ -66,25 +66,31 @@ pub(super) fn splice(
             path_in_rest.insert(e, path);
         }
     }
-    // Refinement leaves the numbers of vertices as they are.
+    // Halves of sides first, so that they go in pairs as in the layouts they come from. Refinement leaves the numbers of vertices as they are.
     let mut edges: Vec<MacroEdge> = Vec::new();
     let mut edge_of_earlier = vec![u32::MAX; earlier.edges.len()];
-    for (e, edge) in earlier.edges.iter().enumerate().filter(|(e, _)| stays[*e]) {
-        let path = path_in_rest.remove(&(e as u32)).unwrap_or_else(|| edge.path.clone());
-        let ends = [path[0], path[path.len() - 1]].map(|v| number(v, &mut vertices));
-        edge_of_earlier[e] = edges.len() as u32;
-        edges.push(MacroEdge { ends, path, feature: edge.feature });
-    }
-    let mut edge_of_rest: Vec<Same> = Vec::with_capacity(rest.edges.len());
-    for (edge, same) in rest.edges.iter().zip(&same) {
-        edge_of_rest.push(match *same {
-            Some((e, reversed)) => (edge_of_earlier[e as usize], reversed),
-            None => {
-                let ends = edge.ends.map(|v| number(rest.vertices[v as usize], &mut vertices));
-                edges.push(MacroEdge { ends, ..edge.clone() });
-                (edges.len() as u32 - 1, false)
-            }
-        });
+    let mut edge_of_rest: Vec<Same> = vec![(u32::MAX, false); rest.edges.len()];
+    let [spokes_before, spokes_now] = [earlier, rest].map(spokes);
+    for spokes in [false, true] {
+        let own = (0..earlier.edges.len()).filter(|&e| stays[e] && spokes_before[e] == spokes);
+        for e in own {
+            let edge = &earlier.edges[e];
+            let path = path_in_rest.remove(&(e as u32)).unwrap_or_else(|| edge.path.clone());
+            let ends = [path[0], path[path.len() - 1]].map(|v| number(v, &mut vertices));
+            edge_of_earlier[e] = edges.len() as u32;
+            edges.push(MacroEdge { ends, path, feature: edge.feature });
+        }
+        for e in (0..rest.edges.len()).filter(|&e| spokes_now[e] == spokes) {
+            let edge = &rest.edges[e];
+            edge_of_rest[e] = match same[e] {
+                Some((e, reversed)) => (edge_of_earlier[e as usize], reversed),
+                None => {
+                    let ends = edge.ends.map(|v| number(rest.vertices[v as usize], &mut vertices));
+                    edges.push(MacroEdge { ends, ..edge.clone() });
+                    (edges.len() as u32 - 1, false)
+                }
+            };
+        }
     }
     let of_rest = |side: Side| {
         let (edge, reversed) = edge_of_rest[side.edge as usize];

@@ -45,17 +45,26 @@ pub(super) fn tiles(layout: &QuadLayout) -> Vec<Tile> {
     tiles
 }
 
-/// The sides of regions: consecutive halves in their loops. None where they do not go in pairs.
-pub(super) fn region_sides(layout: &QuadLayout) -> Option<Vec<u32>> {
+/// The sides of regions: consecutive halves in their loops. Halves that were divided since belong to none.
+pub(super) fn region_sides(layout: &QuadLayout) -> Vec<u32> {
     let mut found = Vec::new();
     for sides in layout.region_faces.iter().flat_map(|face| &face.loops) {
-        if !sides.len().is_multiple_of(2) {
-            return None;
+        for (k, side) in sides.iter().enumerate() {
+            let next = sides[(k + 1) % sides.len()];
+            if side.edge / 2 == next.edge / 2 && side.edge != next.edge {
+                found.push(side.edge / 2);
+            }
         }
-        // A loop may begin with the second half of a side.
-        let is_pair = |k: usize| sides[k].edge / 2 == sides[(k + 1) % sides.len()].edge / 2;
-        let first = (0..2).find(|&first| (first..sides.len()).step_by(2).all(is_pair))?;
-        found.extend((first..sides.len()).step_by(2).map(|k| sides[k].edge / 2));
     }
-    Some(found)
+    found
+}
+
+/// Per edge: it leads to the middle of a tile, and is no half of a side.
+pub(super) fn spokes(layout: &QuadLayout) -> Vec<bool> {
+    let mut spokes = vec![false; layout.edges.len()];
+    for [_, one, other, _] in &layout.quads {
+        spokes[one.edge as usize] = true;
+        spokes[other.edge as usize] = true;
+    }
+    spokes
 }

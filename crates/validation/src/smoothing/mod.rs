@@ -29,7 +29,7 @@ pub(crate) fn figures(original: &Part, part: &Part) -> SmoothingFigures {
         total_change_mm,
         cumulative_change_mm: record.cumulative_change,
         frozen_vertices: part.frozen.iter().filter(|&&frozen| frozen).count(),
-        frozen_moved: frozen_moved(original, part, same_vertices),
+        frozen_moved: frozen_moved(original, part, same_vertices, record.kept > 0),
         holes,
         cylinders,
         shape: angles::figures(original, part),
@@ -38,8 +38,13 @@ pub(crate) fn figures(original: &Part, part: &Part) -> SmoothingFigures {
     }
 }
 
-/// Frozen vertices whose coordinates differ in a bit from those they had.
-fn frozen_moved(original: &Part, part: &Part, same_vertices: bool) -> usize {
+/// Over the mean edge length: what an edit has moved by less counts as not edited for smoothing.
+const NOT_EDITED: f64 = 1e-4;
+
+/// Frozen vertices whose coordinates differ in a bit from those they had; after an edit, from those of before it that smoothing has
+/// `kept`, by as much as counts as no edit.
+fn frozen_moved(original: &Part, part: &Part, same_vertices: bool, kept: bool) -> usize {
+    let slack = if kept { NOT_EDITED * original.mesh.mean_edge_length() } else { 0.0 };
     let frozen = part.mesh.vertices().filter(|v| part.frozen[v.index()]);
     frozen
         .filter(|v| {
@@ -51,7 +56,8 @@ fn frozen_moved(original: &Part, part: &Part, same_vertices: bool) -> usize {
             };
             let before = source.and_then(|s| original.mesh.positions.get(s.index()));
             let bits = |p: topipe_mesh::DVec3| p.to_array().map(f64::to_bits);
-            before.is_none_or(|&p| bits(p) != bits(part.mesh.position(*v)))
+            let own = part.mesh.position(*v);
+            before.is_none_or(|&p| bits(p) != bits(own) && !(p.distance(own) <= slack && kept))
         })
         .count()
 }
