@@ -42,7 +42,7 @@ mod tiling;
 mod verify;
 mod verify_bordered;
 
-pub use bordered::{Layout, NotTiled, Rest, tile_rest};
+pub use bordered::{NotTiled, Rest, SizingField, tile_rest};
 pub use error::TilingError;
 pub use parameters::{Method, Parameters};
 pub use tessellate::{tile, tile_sized};

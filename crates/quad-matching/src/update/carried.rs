@@ -5,7 +5,7 @@ use crate::cost::within_gates;
 use crate::{QuadLayout, QuadMatchingError};
 use std::collections::{BTreeMap, BTreeSet};
 use topipe_mesh::{Connectivity, FaceId, FeatureEdge, HalfEdgeId, Lineage, Part, RegionId, VertexId};
-use topipe_tiling::Layout;
+use topipe_tiling::SizingField;
 
 /// Of the area it had: tiles that are smaller or larger now are laid out anew.
 const AREA: [f64; 2] = [0.6, 1.6];
@@ -42,12 +42,18 @@ pub(super) fn carry(
             earlier.part.mesh.face_count()
         )));
     }
+    if before.quad_of_face.len() != before.part.mesh.face_count()
+        || before.part.region_of_face.len() != before.part.mesh.face_count()
+        || before.part.frozen.len() != before.part.mesh.vertex_count()
+    {
+        return Ok(Err("the arrays of the earlier layout do not fit together".into()));
+    }
     let Some(lineage) = lineage(earlier) else {
         return Ok(Err(
             "the earlier layout was made of another mesh than the one that is said to be its own".into(),
         ));
     };
-    let Layout { region_of_face: taken, size } = Layout::of(part, parameters)?;
+    let SizingField { region_of_face: taken, size } = SizingField::of(part, parameters)?;
     let parents = lineage.faces();
     let region: Vec<RegionId> = parents.iter().map(|f| taken[f.index()]).collect();
     let size = parents.iter().map(|f| size[f.index()]).collect();

@@ -166,6 +166,20 @@ mod tests {
         assert_eq!(missing(&report), ["Smoothed mesh", "Quadrilateral layout", "Centre line"]);
     }
 
+    /// Smoothing keeps the volume, but for what it left where it was before an edit.
+    #[test]
+    fn vertices_that_were_kept_cost_volume() {
+        for (kept, error, state) in [
+            (0, 1e-10, State::Kept),
+            (0, 1e-4, State::Broken),
+            (12, 1e-4, State::Kept),
+            (12, -2e-3, State::Broken),
+        ] {
+            let report = json!({"smoothing": {"kept_vertices": kept, "volume_error": error}});
+            assert_eq!(find(&sections(&report), "smoothing.volume_error").state, state, "{kept}, {error}");
+        }
+    }
+
     #[test]
     fn what_was_never_heard_of_is_shown_under_its_name() {
         let report = json!({

@@ -28,7 +28,7 @@ mod sizes;
 mod strips;
 mod surface;
 
-pub use rest::{Layout, NotTiled, Rest, tile_rest};
+pub use rest::{NotTiled, Rest, SizingField, tile_rest};
 
 use crate::{FeatureSegment, Parameters, TileId, Tiling, TilingError};
 use barriers::Segment;

@@ -42,14 +42,14 @@ impl From<TilingError> for NotTiled {
 
 /// What [`crate::tile`] goes by, per face of a part.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Layout {
+pub struct SizingField {
     /// The region that is taken out of the free surface it belongs to, or [`RegionId::NONE`].
     pub region_of_face: Vec<RegionId>,
     /// The distance wanted between neighbouring sites, mm.
     pub size: Vec<f64>,
 }
 
-impl Layout {
+impl SizingField {
     /// Of a closed part. A number of tiles that is asked for is not aimed at.
     ///
     /// # Errors
