@@ -141,19 +141,7 @@ fn tile_scaled(
             "{handed_back} faces of regions too small or pinched are tiled like free surface"
         ));
     }
-    let free_area: f64 = part
-        .mesh
-        .faces()
-        .filter(|f| region_of_face[f.index()] == RegionId::NONE)
-        .map(|f| part.mesh.area_vector(f).length() / 2.0)
-        .sum();
-    let size = if parameters.tiles > 0 {
-        // Hexagonal tiles of equal area.
-        (2.0 * free_area.max(1e-3 * part.mesh.area()) / (3f64.sqrt() * f64::from(parameters.tiles))).sqrt()
-    } else {
-        parameters.tile_size * wall(part)
-    };
-    let spacing = scale * size;
+    let spacing = scale * spacing(part, &region_of_face, parameters);
     let bends = bends(&refiner, &region_of_face, spacing, parameters);
     let factor = |f: usize| sizes.and_then(|s| s.get(f)).copied().filter(|s| *s > 0.0).unwrap_or(1.0);
     let size: Vec<f64> = (0..part.mesh.face_count()).map(|f| spacing * factor(f) * bends[f]).collect();
@@ -187,6 +175,18 @@ fn wall(part: &Part) -> f64 {
 /// Smaller regions are not taken out, mm2.
 fn least_area(part: &Part, parameters: &Parameters) -> f64 {
     if parameters.follow_features { (parameters.least_region * wall(part)).powi(2) } else { f64::INFINITY }
+}
+
+/// The distance wanted between neighbouring sites where the surface is flat, mm.
+fn spacing(part: &Part, region_of_face: &[RegionId], parameters: &Parameters) -> f64 {
+    if parameters.tiles == 0 {
+        return parameters.tile_size * wall(part);
+    }
+    let mesh = &part.mesh;
+    let is_free = |f: &FaceId| region_of_face[f.index()] == RegionId::NONE;
+    let free_area: f64 = mesh.faces().filter(is_free).map(|f| mesh.area_vector(f).length() / 2.0).sum();
+    // Hexagonal tiles of equal area.
+    (2.0 * free_area.max(1e-3 * mesh.area()) / (3f64.sqrt() * f64::from(parameters.tiles))).sqrt()
 }
 
 /// Factors on the size of tiles, per face, where the surface bends.

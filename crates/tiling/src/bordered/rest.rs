@@ -2,7 +2,7 @@
 
 use super::barriers::Segment;
 use super::surface::Surface;
-use super::{Construction, barriers, bends, least_area, regions, wall};
+use super::{Construction, barriers, bends, least_area, regions, spacing};
 use crate::{FeatureSegment, Method, Parameters, Tiling, TilingError};
 use topipe_mesh::refine::Refiner;
 use topipe_mesh::{Part, RegionId};
@@ -50,14 +50,14 @@ pub struct SizingField {
 }
 
 impl SizingField {
-    /// Of a closed part. A number of tiles that is asked for is not aimed at.
+    /// Of a closed part. Where a number of tiles is asked for, of the size that gives it by area alone.
     ///
     /// # Errors
     /// When the mesh is not an oriented manifold.
     pub fn of(part: &Part, parameters: &Parameters) -> Result<Self, TilingError> {
         let refiner = Refiner::new(part)?;
         let region_of_face = regions::choose(&refiner, least_area(part, parameters)).region;
-        let spacing = parameters.tile_size * wall(part);
+        let spacing = spacing(part, &region_of_face, parameters);
         let bends = bends(&refiner, &region_of_face, spacing, parameters);
         Ok(Self { size: bends.iter().map(|factor| factor * spacing).collect(), region_of_face })
     }
