@@ -1,7 +1,7 @@
 //! What an earlier smoothing of nearly the same part has made stays as it is.
 //!
 //! Smoothing is not local: the volume is restored by moving all free vertices, `alpha` is one number for the whole mesh. After an
-//! edit of one corner every vertex moves by some 1e-5 mm, and nothing that was made of the mesh can be kept. Here the part is
+//! edit of one corner every vertex moves a little, and nothing that was made of the mesh can be kept. Here the part is
 //! smoothed as ever, and then each vertex that the edit has not touched and that has moved by next to nothing is put back to where
 //! the earlier smoothing had left it; so are the shapes of regions, and which edges are features.
 
