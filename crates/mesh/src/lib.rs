@@ -9,6 +9,7 @@
 
 pub mod coarsen;
 mod connectivity;
+mod correspondence;
 mod csr;
 mod curvature;
 pub mod disk_map;
@@ -27,6 +28,7 @@ pub mod triangle_mesh;
 pub mod write;
 
 pub use connectivity::{Connectivity, ConnectivityError};
+pub use correspondence::Correspondence;
 pub use glam::{DMat3, DVec3};
 pub use ids::{FaceId, HalfEdgeId, RegionId, VertexId};
 pub use lineage::Lineage;

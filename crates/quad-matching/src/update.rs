@@ -9,6 +9,7 @@
 //! [`topipe_tiling::tile_rest`]; its tiles are divided into quads as ever; both are joined along the borders ([`splice`]).
 
 mod carried;
+mod restated;
 mod splice;
 mod tiles;
 
@@ -45,7 +46,8 @@ pub struct Earlier<'a> {
 /// are the same bits as before but for their numbers, unless tiles beside them are laid out anew (then one ring more may be). Provenance
 /// refers to `part`.
 ///
-/// Where the triangles are others, or nothing can be kept, the whole part is laid out, and a warning says why.
+/// Triangles that the earlier part does not have, see [`Correspondence`](topipe_mesh::Correspondence), are laid out anew, with the tiles that lay on those which are
+/// gone. Where nothing can be kept the whole part is laid out, and a warning says why.
 ///
 /// # Errors
 /// Those of [`tile`] and [`match_quads`].
@@ -57,7 +59,7 @@ pub fn update(
 ) -> Result<QuadLayout, QuadMatchingError> {
     let UpdateParameters { tiles, quads } = parameters;
     quads.validate()?;
-    let why = match carry(part, earlier, tiles)? {
+    let why = match carry(part, earlier, tiles, progress)? {
         Err(why) => why,
         Ok(carried) => match rebuild(&carried, part, parameters, progress)? {
             Err(why) => why,
@@ -147,6 +149,9 @@ fn rebuild(
         let zones = zones(carried, &plan);
         let is_whole = !zones.contains(&RegionId::NONE) && !carried.touched.contains(&true);
         let kept = plan.anew.iter().filter(|anew| !**anew).count();
+        if is_whole && carried.lost > 0 {
+            return Ok(Err("triangles of the earlier mesh are gone, and there are no others instead".into()));
+        }
         if is_whole {
             progress.remark(&format!("all {kept} tiles are kept"));
             return Ok(Ok(layout.clone()));

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use topipe_mesh::import::{ImportOptions, Source, read_source};
-use topipe_mesh::{DVec3, Part, Provenance};
+use topipe_mesh::refine::Refiner;
+use topipe_mesh::{DVec3, HalfEdgeId, Part, Provenance, TriangleMesh, VertexId};
 use topipe_progress::{Progress, Recorder};
 use topipe_quad_matching::{
     Earlier, QuadLayout, QuadMatchingError, UpdateParameters, match_quads, update, verify,
@@ -96,6 +97,24 @@ fn without_an_edit_all_is_kept() {
     }
 }
 
+/// The mesh of a layout is that of the part, but for where it is cut.
+fn check_lies_on(layout: &QuadLayout, part: &Part) {
+    let [own, part] = [&layout.part.mesh, &part.mesh];
+    assert!((own.volume() / part.volume() - 1.0).abs() < 1e-9);
+    assert!((own.area() / part.area() - 1.0).abs() < 1e-9);
+    for (v, source) in own.vertices().zip(&layout.part.provenance) {
+        let p = match *source {
+            Provenance::Vertex(v) => part.position(v),
+            Provenance::Edge { ends: [a, b], t } => part.position(a).lerp(part.position(b), t),
+            Provenance::Face { face, weights: [s, t] } => {
+                let [a, b, c] = part.corners(face);
+                a * (1.0 - s - t) + b * s + c * t
+            }
+        };
+        assert!(p.distance(own.position(v)) < 1e-9 * part.diagonal());
+    }
+}
+
 /// Bumps on free surface, over borders of flat faces and beside holes.
 #[test]
 fn an_edit_changes_the_quads_around_it() {
@@ -116,21 +135,89 @@ fn an_edit_changes_the_quads_around_it() {
             assert!(10 * same > 7 * all, "{name} {share}: {same} of {all}");
             assert!(layout.quads.len() < 3 * all / 2, "{name} {share}: {} for {all}", layout.quads.len());
             assert!(layout.outside_gates() <= 2, "{name} {share}");
-            // Its mesh is that of the part, but for where it is cut.
-            let [own, part] = [&layout.part.mesh, &smoothed.mesh];
-            assert!((own.volume() / part.volume() - 1.0).abs() < 1e-9);
-            assert!((own.area() / part.area() - 1.0).abs() < 1e-9);
-            for (v, source) in own.vertices().zip(&layout.part.provenance) {
-                let p = match *source {
-                    Provenance::Vertex(v) => part.position(v),
-                    Provenance::Edge { ends: [a, b], t } => part.position(a).lerp(part.position(b), t),
-                    Provenance::Face { face, weights: [s, t] } => {
-                        let [a, b, c] = part.corners(face);
-                        a * (1.0 - s - t) + b * s + c * t
-                    }
-                };
-                assert!(p.distance(own.position(v)) < 1e-9 * part.diagonal());
-            }
+            check_lies_on(&layout, &smoothed);
+        }
+    }
+}
+
+/// The same part with other numbers, as another program would have written it.
+fn renumbered(part: &Part) -> Part {
+    let mut state = 7u64;
+    let mut shuffled = |n: usize| {
+        let mut order: Vec<usize> = (0..n).collect();
+        for k in (1..n).rev() {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            order.swap(k, (state >> 33) as usize % (k + 1));
+        }
+        order
+    };
+    let (vertices, faces) = (shuffled(part.mesh.vertex_count()), shuffled(part.mesh.face_count()));
+    let mut number = vec![VertexId::NONE; vertices.len()];
+    vertices.iter().enumerate().for_each(|(k, &v)| number[v] = VertexId::new(k));
+    let triangle = |&f: &usize| {
+        let mut t = part.mesh.triangles[f].map(|v| number[v.index()]);
+        t.rotate_left(f % 3);
+        t
+    };
+    let mut other = Part::new(TriangleMesh {
+        positions: vertices.iter().map(|&v| part.mesh.positions[v]).collect(),
+        triangles: faces.iter().map(triangle).collect(),
+    });
+    other.design = faces.iter().map(|&f| part.design[f]).collect();
+    other.import.clone_from(&part.import);
+    other
+}
+
+/// The part with new vertices in the middle of edges around a point.
+fn refined(part: &Part, center: DVec3, radius: f64) -> Part {
+    let mut refiner = Refiner::new(part).unwrap();
+    let within = radius * part.mesh.mean_edge_length();
+    for h in (0..3 * part.mesh.face_count()).map(HalfEdgeId::new) {
+        let ends = [refiner.origin(h), refiner.target(h)].map(|v| refiner.part().mesh.position(v));
+        if h < refiner.twin(h) && ends.iter().all(|p| p.distance(center) < within) {
+            refiner.split_edge(h, 0.5);
+        }
+    }
+    let mut part = refiner.finish().0;
+    part.provenance = part.mesh.vertices().map(Provenance::Vertex).collect();
+    part
+}
+
+/// Nothing goes by the numbers of vertices and triangles.
+#[test]
+fn a_file_with_other_numbers_is_the_same_part() {
+    for name in ["bracket", "y-form"] {
+        let run = run(name);
+        let smoothed = run.after(&renumbered(&run.original), &Parameters::default());
+        assert_eq!(smoothed.smoothing.as_ref().unwrap().kept as usize, smoothed.mesh.vertex_count());
+        let (layout, recorder) = run.updated(&smoothed);
+        assert_eq!(recorder.warnings(), Vec::<String>::new(), "{name}");
+        // Tiles, and what lies on them, are in the order they were in.
+        assert_eq!(layout.part.mesh, run.layout.part.mesh);
+        assert_eq!(layout.vertices, run.layout.vertices);
+        assert_eq!(layout.edges, run.layout.edges);
+        assert_eq!(layout.quads, run.layout.quads);
+        check_lies_on(&layout, &smoothed);
+    }
+}
+
+/// A file with other numbers and other triangles around a point, there with a bump or not.
+#[test]
+fn triangles_that_are_new_are_laid_out() {
+    for (name, places) in [("bracket", [(0.1, 0.0), (0.7, 1.0)]), ("support", [(0.5, 0.3), (0.9, 0.0)])] {
+        let run = run(name);
+        for (share, height) in places {
+            let n = run.original.mesh.vertex_count();
+            let center = run.original.mesh.positions[(share * n as f64) as usize];
+            let edited = renumbered(&refined(&run.bumped(center, 4.0, height), center, 3.0));
+            assert!(edited.mesh.face_count() > run.original.mesh.face_count() + 50, "{name} {share}");
+            let smoothed = run.after(&edited, &Parameters::default());
+            let (layout, recorder) = run.updated(&smoothed);
+            assert_eq!(recorder.warnings(), Vec::<String>::new(), "{name} {share}");
+            let (all, same) = (run.layout.quads.len(), common(&run.layout, &layout));
+            assert!(10 * same > 7 * all, "{name} {share}: {same} of {all}");
+            assert!(layout.quads.len() < 3 * all / 2, "{name} {share}: {} for {all}", layout.quads.len());
+            check_lies_on(&layout, &smoothed);
         }
     }
 }
@@ -180,10 +267,10 @@ fn what_does_not_fit_is_laid_out_anew_and_said() {
         let tiling = tile(part, &Default::default(), &Progress::silent()).unwrap();
         match_quads(&tiling, &Default::default(), &Progress::silent()).unwrap()
     };
-    let mut other = run.smoothed.clone();
-    other.mesh.triangles[7].rotate_left(1);
+    let mut other = renumbered(&run.smoothed);
+    other.mesh.positions.iter_mut().for_each(|p| p.x += 1.0);
     let (layout, recorder) = run.updated(&other);
-    assert!(recorder.warnings()[0].contains("do not join the same vertices"), "{:?}", recorder.warnings());
+    assert!(recorder.warnings()[0].contains("none of its"), "{:?}", recorder.warnings());
     assert_eq!(layout, fresh(&other));
     // The layout of another mesh, and a tiling that is not its own.
     let support = self::run("support");

@@ -5,10 +5,11 @@
 //! smoothed as ever, and then each vertex that the edit has not touched and that has moved by next to nothing is put back to where
 //! the earlier smoothing had left it; so are the shapes of regions, and which edges are features.
 
+use crate::locality::Order;
 use crate::smooth::smooth;
 use crate::{Parameters, SmoothingError};
 use std::collections::{BTreeMap, BTreeSet};
-use topipe_mesh::{FeatureEdge, Part, RegionId, RegionShape, VertexId, meet};
+use topipe_mesh::{Correspondence, FaceId, FeatureEdge, Part, RegionId, RegionShape, VertexId, meet};
 use topipe_progress::Progress;
 
 /// Over the mean edge length: what has moved by less before smoothing was not edited. File formats with decimal numbers round
@@ -35,7 +36,8 @@ pub struct Earlier<'a> {
 /// Smooths `part`, of which `earlier` is a version from before an edit, so that what the edit has not touched becomes what it became
 /// then, bit for bit, where it would differ by at most 0.01 mean edge lengths.
 ///
-/// Where the triangles of both are not the same nothing is kept, and a warning says so.
+/// Vertices of triangles that the earlier version does not have, see [`Correspondence`], count as touched. Where it has none of them
+/// nothing is kept, and a warning says so.
 ///
 /// Guarantees: see [`smooth`], but the volume is kept only as far as vertices are not put back, by at most 0.01 mean edge lengths
 /// times the area (a warning says so from a thousandth of it on), and triangles are not kept from passing through each
@@ -49,24 +51,41 @@ pub fn smooth_after(
     parameters: &Parameters,
     progress: &Progress,
 ) -> Result<Part, SmoothingError> {
-    let smoothed = smooth(part, parameters, progress)?;
-    let triangles = &part.mesh.triangles;
-    let same = |other: &Part| {
-        other.mesh.triangles == *triangles && other.mesh.vertex_count() == part.mesh.vertex_count()
+    let Earlier { original, smoothed: before } = earlier;
+    let same = Correspondence::new(&original.mesh, &part.mesh);
+    let of_one_mesh = original.mesh.triangles == before.mesh.triangles;
+    let Some(same) = same.ok().filter(|_| of_one_mesh && part.mesh.positions.iter().all(|p| p.is_finite()))
+    else {
+        let smoothed = smooth(part, parameters, progress)?;
+        progress.warn("nothing is kept of the earlier smoothing: it is not one of the mesh that is said to be its input");
+        return Ok(smoothed);
     };
-    if !same(earlier.original) || !same(earlier.smoothed) {
+    let new: Vec<FaceId> = same.new_faces().collect();
+    let faces = part.mesh.face_count();
+    if new.len() == faces {
+        let smoothed = smooth(part, parameters, progress)?;
         progress.warn(&format!(
-            "nothing is kept of the earlier smoothing: the mesh has {} triangles, that one {}, and they do not join the same vertices in the same order",
-            triangles.len(),
-            earlier.original.mesh.face_count()
+            "nothing is kept of the earlier smoothing: none of the {faces} triangles is one of the {} of the earlier mesh",
+            original.mesh.face_count()
         ));
         return Ok(smoothed);
     }
-    Ok(keep(part, smoothed, earlier, progress))
+    if same.is_identity() {
+        return Ok(keep(part, smooth(part, parameters, progress)?, earlier, &new, progress));
+    }
+    progress.remark(&format!(
+        "{} of {faces} triangles were in the earlier mesh, which had {}",
+        faces - new.len(),
+        original.mesh.face_count()
+    ));
+    let (order, mesh) = Order::following(&same, &part.mesh);
+    let smoothed = order.restore(part, smooth(&order.apply(part, mesh), parameters, progress)?);
+    let [original, before] = [original, before].map(|earlier| same.restated(earlier, &part.mesh));
+    Ok(keep(part, smoothed, Earlier { original: &original, smoothed: &before }, &new, progress))
 }
 
-/// Puts back what has hardly moved.
-fn keep(part: &Part, smoothed: Part, earlier: Earlier<'_>, progress: &Progress) -> Part {
+/// Puts back what has hardly moved. Triangles that are `new` were edited.
+fn keep(part: &Part, smoothed: Part, earlier: Earlier<'_>, new: &[FaceId], progress: &Progress) -> Part {
     let before = earlier.smoothed;
     let edge = before.mesh.mean_edge_length();
     let vertices = part.mesh.vertex_count();
@@ -77,6 +96,9 @@ fn keep(part: &Part, smoothed: Part, earlier: Earlier<'_>, progress: &Progress) 
         if part.design[f] != earlier.original.design[f] {
             t.iter().for_each(|v| untouched[v.index()] = false);
         }
+    }
+    for t in new.iter().map(|f| part.mesh.triangles[f.index()]) {
+        t.iter().for_each(|v| untouched[v.index()] = false);
     }
     let mut kept = smoothed;
     let settled = settle_regions(&mut kept, before, &untouched, NEXT_TO_NOTHING * edge);

@@ -6,11 +6,13 @@
 //! Morton curve, where half of them waited for neighbours, and 1.05 so. The curve comes first all the same, because the search
 //! itself reads neighbours. Within a strip (`rows.rs`) vertices with as many neighbours follow each other. Small meshes fit
 //! the cache as they are.
+//!
+//! Or in the order of an earlier version, for the sake of the same bits.
 
 use crate::reorder::{breadth_first, inverse, sort_strips};
 use rayon::prelude::*;
 use topipe_mesh::spatial::along_curve;
-use topipe_mesh::{DVec3, FeatureEdge, Part, TriangleMesh, VertexId};
+use topipe_mesh::{Correspondence, DVec3, FaceId, FeatureEdge, Part, TriangleMesh, VertexId};
 
 /// Meshes with fewer vertices keep their numbering: four arrays of positions fit a second-level cache and a bit.
 pub(crate) const SMALL: usize = 50_000;
@@ -47,6 +49,23 @@ impl Order {
         let positions = order.old.par_iter().map(|&o| mesh.positions[o as usize]).collect();
         let triangles = triangles.into_iter().map(|t| t.map(VertexId)).collect();
         (order, TriangleMesh { positions, triangles })
+    }
+
+    /// The order of an earlier version, what is new last, and the mesh in it. A mesh with the same triangles as that version becomes the same to
+    /// the bit, so that what goes by numbers comes to the same end.
+    pub(crate) fn following(same: &Correspondence, mesh: &TriangleMesh) -> (Self, TriangleMesh) {
+        let mut old: Vec<VertexId> = mesh.vertices().collect();
+        old.sort_by_key(|v| same.vertex_was(*v));
+        let mut old_face: Vec<FaceId> = mesh.faces().collect();
+        old_face.sort_by_key(|f| same.face_was(*f));
+        let old: Vec<u32> = old.into_iter().map(|v| v.0).collect();
+        let new = inverse(&old);
+        let triangle = |f: &FaceId| same.corners(*f, mesh).map(|v| VertexId(new[v.index()]));
+        let inner = TriangleMesh {
+            positions: old.iter().map(|&v| mesh.positions[v as usize]).collect(),
+            triangles: old_face.iter().map(triangle).collect(),
+        };
+        (Self { old, new, old_face: old_face.into_iter().map(|f| f.0).collect() }, inner)
     }
 
     /// The numbering with these old vertices, faces in the order of their first ones, and the triangles in it.
@@ -204,5 +223,13 @@ mod tests {
         };
         assert_eq!(sum(&inner.mesh, f), sum(&part.mesh, 2));
         assert_eq!(order.restore(&part, inner), part);
+        // And back in the order of an earlier version, all bits.
+        let (order, mesh) = Order::breadth_first(&part.mesh);
+        let mut other = order.apply(&part, mesh);
+        other.mesh.triangles.iter_mut().for_each(|t| t.rotate_left(1));
+        let same = Correspondence::new(&part.mesh, &other.mesh).expect("two manifolds");
+        let (order, mesh) = Order::following(&same, &other.mesh);
+        assert_eq!(mesh, part.mesh);
+        assert_eq!(order.apply(&other, mesh), Part { provenance: Vec::new(), ..part });
     }
 }

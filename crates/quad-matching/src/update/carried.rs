@@ -1,10 +1,14 @@
 //! An earlier layout on the part as it is now, and what of it does not fit any more.
 
 use super::Earlier;
+use super::restated::{Restated, restate};
 use crate::cost::within_gates;
 use crate::{QuadLayout, QuadMatchingError};
 use std::collections::{BTreeMap, BTreeSet};
-use topipe_mesh::{Connectivity, FaceId, FeatureEdge, HalfEdgeId, Lineage, Part, RegionId, VertexId};
+use topipe_mesh::{
+    Connectivity, Correspondence, FaceId, FeatureEdge, HalfEdgeId, Lineage, Part, RegionId, VertexId,
+};
+use topipe_progress::Progress;
 use topipe_tiling::SizingField;
 
 /// Of the area it had: tiles that are smaller or larger now are laid out anew.
@@ -24,6 +28,8 @@ pub(super) struct Carried {
     pub(super) touched: Vec<bool>,
     /// Per quad: its shape has changed too much.
     pub(super) misshapen: Vec<bool>,
+    /// Quads that are not in the layout, because triangles they lay on are gone.
+    pub(super) lost: usize,
 }
 
 /// Carries a layout over. The inner error says why that is not possible.
@@ -31,28 +37,39 @@ pub(super) fn carry(
     part: &Part,
     earlier: Earlier<'_>,
     parameters: &topipe_tiling::Parameters,
+    progress: &Progress,
 ) -> Result<Result<Carried, String>, QuadMatchingError> {
     let before = earlier.layout;
-    if part.mesh.triangles != earlier.part.mesh.triangles
-        || part.mesh.vertex_count() != earlier.part.mesh.vertex_count()
-    {
-        return Ok(Err(format!(
-            "the mesh has {} triangles, the earlier one {}, and they do not join the same vertices in the same order",
-            part.mesh.face_count(),
-            earlier.part.mesh.face_count()
-        )));
-    }
     if before.quad_of_face.len() != before.part.mesh.face_count()
         || before.part.region_of_face.len() != before.part.mesh.face_count()
         || before.part.frozen.len() != before.part.mesh.vertex_count()
     {
         return Ok(Err("the arrays of the earlier layout do not fit together".into()));
     }
-    let Some(lineage) = lineage(earlier) else {
-        return Ok(Err(
-            "the earlier layout was made of another mesh than the one that is said to be its own".into(),
-        ));
+    let other = "the earlier layout was made of another mesh than the one that is said to be its own";
+    let Some(lineage) = lineage(earlier) else { return Ok(Err(other.into())) };
+    let same = Correspondence::new(&earlier.part.mesh, &part.mesh)?;
+    let [faces, new] = [part.mesh.face_count(), same.new_faces().count()];
+    if new == faces {
+        return Ok(Err(format!(
+            "none of its {faces} triangles is one of the {} that the earlier mesh had: it was moved as a whole, or another mesh was made of the part",
+            earlier.part.mesh.face_count()
+        )));
+    }
+    let restated = (!same.is_identity()).then(|| restate(earlier, &lineage, &same, &part.mesh));
+    let (earlier, lineage, lost) = match &restated {
+        None => (earlier, lineage, 0),
+        Some(Restated { part: before, layout, lost }) => {
+            let Some(lineage) = Lineage::new(&layout.part, &part.mesh) else { return Ok(Err(other.into())) };
+            progress.remark(&format!(
+                "{} of {faces} triangles were in the earlier mesh, which had {}",
+                faces - new,
+                earlier.part.mesh.face_count()
+            ));
+            (Earlier { part: before, tiling: None, layout }, lineage, *lost)
+        }
     };
+    let before = earlier.layout;
     let SizingField { region_of_face: taken, size } = SizingField::of(part, parameters)?;
     let parents = lineage.faces();
     let region: Vec<RegionId> = parents.iter().map(|f| taken[f.index()]).collect();
@@ -95,11 +112,13 @@ pub(super) fn carry(
     let touched = (0..region.len())
         .map(|f| {
             let expected = if was[f].is_some() { now.get(&was[f]).copied() } else { Some(RegionId::NONE) };
-            expected != Some(region[f]) || (!region[f].is_some() && changed.contains(&parents[f]))
+            !same.face_was(parents[f]).is_some()
+                || expected != Some(region[f])
+                || (!region[f].is_some() && changed.contains(&parents[f]))
         })
         .collect();
     let misshapen = misshapen(before, &layout);
-    Ok(Ok(Carried { layout, lineage, region, size, touched, misshapen }))
+    Ok(Ok(Carried { layout, lineage, region, size, touched, misshapen, lost }))
 }
 
 /// How the mesh of the earlier layout lies on that of the earlier part.

@@ -1,7 +1,9 @@
 //! What an edit has not touched stays what the earlier smoothing had made of it.
 
+use crate::invariance::shuffled;
 use crate::{CASES, read, smoothed};
 use std::sync::Arc;
+use topipe_mesh::refine::Refiner;
 use topipe_mesh::{DVec3, FaceId, Part, RegionShape, VertexId};
 use topipe_progress::{Progress, Recorder};
 use topipe_smoothing::{Earlier, Parameters, smooth_after};
@@ -115,14 +117,66 @@ fn a_region_that_is_moved_has_its_new_shape() {
     assert!(now.regions[base].residual < 1e-6 * edge);
 }
 
+/// The same part with other numbers is smoothed to the same bits.
 #[test]
-fn other_triangles_are_warned_of() {
+fn other_numbers_change_nothing() {
+    for case in ["bracket", "y-form"] {
+        let part = read(case);
+        let before = smoothed(&part, &Parameters::default());
+        let (shuffled, vertex_at, face_at) = shuffled(&part);
+        let (now, warned) = after(&shuffled, &part, &before);
+        assert!(warned.is_empty(), "{warned:?}");
+        for (v, &old) in vertex_at.iter().enumerate() {
+            assert_eq!(now.mesh.positions[v], before.mesh.positions[old]);
+            assert_eq!(now.frozen[v], before.frozen[old]);
+        }
+        for (f, &old) in face_at.iter().enumerate() {
+            assert_eq!(now.region_of_face[f], before.region_of_face[old]);
+        }
+        assert_eq!(now.regions, before.regions);
+        assert_eq!(now.feature_edges.len(), before.feature_edges.len());
+    }
+}
+
+/// Triangles that were divided are smoothed, and what is far from them keeps its bits.
+#[test]
+fn new_triangles_are_touched() {
+    let part = read("bracket");
+    let before = smoothed(&part, &Parameters::default());
+    let edge = part.mesh.mean_edge_length();
+    let (_, center) = bumped(&part, &before, 0.2, 0.0, 0.0);
+    let mut refiner = Refiner::new(&part).unwrap();
+    for f in part.mesh.faces().filter(|f| part.mesh.centroid(*f).distance(center) < 3.0 * edge) {
+        refiner.split_face(f, [1.0 / 3.0; 3]);
+    }
+    let refined = refiner.finish().0;
+    let n = part.mesh.vertex_count();
+    assert!(refined.mesh.vertex_count() > n + 20);
+    let (shuffled, vertex_at, _) = shuffled(&refined);
+    let (now, warned) = after(&shuffled, &part, &before);
+    assert!(warned.is_empty(), "{warned:?}");
+    let (mut moved, mut far) = (0, 0);
+    for (v, &old) in vertex_at.iter().enumerate().filter(|(_, old)| **old < n) {
+        let is_same = now.mesh.positions[v] == before.mesh.positions[old];
+        moved += usize::from(!is_same);
+        far += usize::from(!is_same && before.mesh.positions[old].distance(center) > 12.0 * edge);
+    }
+    // Far away there are some at the limit of what is put back, as above.
+    assert!(moved > 20 && 10 * moved < n && 100 * far < n, "{moved}, {far} far");
+    assert!(now.smoothing.as_ref().unwrap().kept as usize <= n - moved);
+}
+
+#[test]
+fn another_mesh_is_warned_of() {
     let part = read("y-form");
     let before = smoothed(&part, &Parameters::default());
-    let mut other = part.clone();
-    other.mesh.triangles.swap(3, 4);
-    other.design.swap(3, 4);
+    let mut other = shuffled(&part).0;
+    other.mesh.positions.iter_mut().for_each(|p| p.y += 7.0);
     let (now, warned) = after(&other, &part, &before);
-    assert!(warned.len() == 1 && warned[0].contains("nothing is kept"), "{warned:?}");
+    assert!(warned.len() == 1 && warned[0].contains("none of the"), "{warned:?}");
     assert_eq!(now, smoothed(&other, &Parameters::default()));
+    // What was smoothed is something else.
+    let (now, warned) = after(&part, &other, &before);
+    assert!(warned.len() == 1 && warned[0].contains("said to be its input"), "{warned:?}");
+    assert_eq!(now, before);
 }

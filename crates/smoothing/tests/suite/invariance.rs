@@ -24,10 +24,8 @@ fn smoothing_commutes_with_turning_scaling_and_shifting() {
     }
 }
 
-#[test]
-fn smoothing_does_not_depend_on_numbering() {
-    let part = read("y-form");
-    let plain = smoothed(&part, &Parameters::default());
+/// The part with other numbers, and the old number of each of its vertices and faces.
+pub(crate) fn shuffled(part: &Part) -> (Part, Vec<usize>, Vec<usize>) {
     let mut noise = Noise(5);
     let mut shuffle = |n: usize| {
         let mut order: Vec<usize> = (0..n).collect();
@@ -51,6 +49,14 @@ fn smoothing_does_not_depend_on_numbering() {
     };
     let mut shuffled = Part::new(mesh);
     shuffled.design = face_at.iter().map(|&f| part.design[f]).collect();
+    (shuffled, vertex_at, face_at)
+}
+
+#[test]
+fn smoothing_does_not_depend_on_numbering() {
+    let part = read("y-form");
+    let plain = smoothed(&part, &Parameters::default());
+    let (shuffled, vertex_at, face_at) = shuffled(&part);
     let result = smoothed(&shuffled, &Parameters::default());
     for (new, &old) in vertex_at.iter().enumerate() {
         assert_eq!(result.frozen[new], plain.frozen[old]);
