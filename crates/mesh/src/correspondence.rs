@@ -314,14 +314,6 @@ mod tests {
         check(&same, &part.mesh, &mesh);
         assert_eq!(same.new_faces().count(), 9 * 3 + 4);
         assert!(part.mesh.vertices().all(|v| same.vertex_now(v).is_some()));
-        let at = |mesh: &TriangleMesh, point| match point {
-            Provenance::Vertex(v) => mesh.position(v),
-            Provenance::Edge { ends: [a, b], t } => mesh.position(a).lerp(mesh.position(b), t),
-            Provenance::Face { face, weights: [s, t] } => {
-                let [a, b, c] = mesh.corners(face);
-                a * (1.0 - s - t) + b * s + c * t
-            }
-        };
         for face in part.mesh.faces() {
             let point = Provenance::Face { face, weights: [0.1, 0.2] };
             let [a, b, _] = part.mesh.triangles[face.index()];
@@ -331,7 +323,8 @@ mod tests {
                 continue;
             };
             for (point, now) in [(point, now), (on_edge, same.provenance(&on_edge).unwrap())] {
-                assert!(at(&mesh, now).distance(at(&part.mesh, point)) < 1e-14);
+                let [now, point] = [now.point(&mesh), point.point(&part.mesh)].map(Option::unwrap);
+                assert!(now.distance(point) < 1e-14);
             }
         }
     }

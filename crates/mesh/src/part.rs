@@ -142,6 +142,21 @@ pub enum Provenance {
     },
 }
 
+impl Provenance {
+    /// Where that is on the parent mesh, mm; none where it does not have such a vertex or face.
+    pub fn point(&self, parent: &TriangleMesh) -> Option<DVec3> {
+        let position = |v: VertexId| parent.positions.get(v.index()).copied();
+        match *self {
+            Self::Vertex(v) => position(v),
+            Self::Edge { ends: [a, b], t } => Some(position(a)?.lerp(position(b)?, t)),
+            Self::Face { face, weights: [s, t] } => {
+                let [a, b, c] = *parent.triangles.get(face.index())?;
+                Some(position(a)? * (1.0 - s - t) + position(b)? * s + position(c)? * t)
+            }
+        }
+    }
+}
+
 /// One kind of repair made on import, and how often.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Repair {

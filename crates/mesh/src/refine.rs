@@ -312,16 +312,7 @@ mod tests {
         assert!((refiner.part().mesh.area() - original.mesh.area()).abs() < 1e-12);
         let (part, _) = refiner.finish();
         for v in part.mesh.vertices() {
-            let expected = match part.provenance[v.index()] {
-                Provenance::Vertex(p) => original.mesh.position(p),
-                Provenance::Edge { ends, t } => {
-                    original.mesh.position(ends[0]).lerp(original.mesh.position(ends[1]), t)
-                }
-                Provenance::Face { face, weights: [u, w] } => {
-                    let [a, b, c] = original.mesh.corners(face);
-                    (1.0 - u - w) * a + u * b + w * c
-                }
-            };
+            let expected = part.provenance[v.index()].point(&original.mesh).unwrap();
             assert!(expected.distance(part.mesh.position(v)) < 1e-12);
         }
     }

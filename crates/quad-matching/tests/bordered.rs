@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use topipe_mesh::import::{ImportOptions, Source, read_source};
-use topipe_mesh::{DVec3, FaceId, Part, Provenance, Region, RegionId, RegionShape, TriangleMesh, VertexId};
+use topipe_mesh::{DVec3, FaceId, Part, Region, RegionId, RegionShape, TriangleMesh, VertexId};
 use topipe_progress::Progress;
 use topipe_quad_matching::{Pairing, Parameters, QuadLayout, QuadMatchingError, match_quads, verify};
 use topipe_smoothing::smooth;
@@ -55,14 +55,7 @@ fn two_quads_share_a_corner_that_is_too_wide_for_one() {
     // Divided or not, vertices say where in the mesh of the tiling they lie.
     let (before, after) = (&tiling.part.mesh, &layout.part.mesh);
     for (v, source) in after.vertices().zip(&layout.part.provenance) {
-        let expected = match *source {
-            Provenance::Vertex(v) => before.position(v),
-            Provenance::Edge { ends: [a, b], t } => before.position(a).lerp(before.position(b), t),
-            Provenance::Face { face, weights: [u, v] } => {
-                let [a, b, c] = before.corners(face);
-                a * (1.0 - u - v) + b * u + c * v
-            }
-        };
+        let expected = source.point(before).unwrap();
         assert!(after.position(v).distance(expected) < 1e-9 * before.diagonal(), "{v:?}");
     }
 }

@@ -103,15 +103,7 @@ fn check_lies_on(layout: &QuadLayout, part: &Part) {
     assert!((own.volume() / part.volume() - 1.0).abs() < 1e-9);
     assert!((own.area() / part.area() - 1.0).abs() < 1e-9);
     for (v, source) in own.vertices().zip(&layout.part.provenance) {
-        let p = match *source {
-            Provenance::Vertex(v) => part.position(v),
-            Provenance::Edge { ends: [a, b], t } => part.position(a).lerp(part.position(b), t),
-            Provenance::Face { face, weights: [s, t] } => {
-                let [a, b, c] = part.corners(face);
-                a * (1.0 - s - t) + b * s + c * t
-            }
-        };
-        assert!(p.distance(own.position(v)) < 1e-9 * part.diagonal());
+        assert!(source.point(part).unwrap().distance(own.position(v)) < 1e-9 * part.diagonal());
     }
 }
 

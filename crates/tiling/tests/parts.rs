@@ -93,6 +93,26 @@ fn a_mesh_that_is_too_coarse_is_refined() {
     assert!(tiling.part.mesh.face_count() > part.mesh.face_count());
 }
 
+/// Bordered tiles: of `n` faces each, edges are at most twice as long as those of `n` equilateral triangles.
+#[test]
+fn tiles_have_the_faces_they_need() {
+    let part = torus(12, 8, 0.4);
+    let longest = |part: &Part| {
+        let sides = part.mesh.faces().map(|f| part.mesh.corners(f));
+        let sides = sides.flat_map(|[a, b, c]| [a.distance(b), b.distance(c), c.distance(a)]);
+        sides.fold(0.0, f64::max)
+    };
+    let spacing = 2.0 * 2.0 * part.mesh.volume() / part.mesh.area();
+    for faces_per_tile in [12, 24, 100] {
+        let limit = 2.0 * (2.0 / f64::from(faces_per_tile)).sqrt() * spacing;
+        let parameters = Parameters { tile_size: 2.0, faces_per_tile, bend: 0.0, ..Default::default() };
+        let tiling = tile(&part, &parameters, &Progress::silent()).unwrap();
+        assert_eq!(verify(&tiling), []);
+        let (before, after) = (longest(&part), longest(&tiling.part));
+        assert!(after <= limit && limit < before, "{faces_per_tile}: {after} of {limit}, {before} before");
+    }
+}
+
 #[test]
 fn shells_are_tiled_each_for_itself() {
     let mut part = torus(12, 8, 0.4);
