@@ -199,6 +199,8 @@ pub struct SmoothingRecord {
     pub method: String,
     /// Iterations that were made.
     pub iterations: u32,
+    /// The pull towards the input, for methods that have one.
+    pub alpha: Option<f64>,
     /// Whether the tolerance was reached before the most iterations.
     pub converged: bool,
     /// Sum over the vertices of the distance between their first and last place, mm.

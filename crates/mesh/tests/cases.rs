@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 use topipe_mesh::import::{ImportOptions, Source, read, read_source};
-use topipe_mesh::{Connectivity, Design, Part, Provenance};
+use topipe_mesh::refine::Refiner;
+use topipe_mesh::{Connectivity, Design, Part, Provenance, write};
 use topipe_progress::Progress;
 
 fn fixture(path: &str) -> PathBuf {
@@ -77,6 +78,27 @@ fn vertices_of_an_stl_are_traced_to_their_first_corner() {
         assert_eq!(part.mesh.positions[v].to_array(), [0, 1, 2].map(|axis| coordinate(corner.index(), axis)));
         assert!(last < Some(corner));
         last = Some(corner);
+    }
+}
+
+/// An edited mesh has no labels of its own: its faces have those of the earlier one, whatever their order is now, and pieces of them too.
+#[test]
+fn labels_are_those_of_an_earlier_version() {
+    for name in CASES {
+        let (part, _) = case(name);
+        let mut refiner = Refiner::new(&part).unwrap();
+        // Every third face in three, the others in another order.
+        part.mesh.faces().step_by(3).for_each(|f| drop(refiner.split_face(f, [0.2, 0.3, 0.5])));
+        let (mut edited, parents) = refiner.finish();
+        edited.mesh.triangles.reverse();
+        let mut off = Vec::new();
+        write::off(&edited.mesh, &mut off).unwrap();
+        let source = Source { earlier: Some(&part), ..Source::new("edited.off", &off) };
+        let read = read_source(&source, &ImportOptions::default(), &Progress::silent()).expect(name);
+        assert_eq!(read.mesh.triangles, edited.mesh.triangles, "{name}");
+        let wanted: Vec<Design> = parents.iter().rev().map(|f| part.design[f.index()]).collect();
+        assert!(read.design == wanted, "{name}");
+        assert!(wanted.contains(&Design::NonDesign));
     }
 }
 

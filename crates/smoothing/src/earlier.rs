@@ -5,11 +5,15 @@
 //! smoothed as ever, and then each vertex that the edit has not touched and that has moved by next to nothing is put back to where
 //! the earlier smoothing had left it; so are the shapes of regions, and which edges are features.
 
+mod level;
+mod regions;
+
 use crate::locality::Order;
 use crate::smooth::smooth;
 use crate::{Parameters, SmoothingError};
-use std::collections::{BTreeMap, BTreeSet};
-use topipe_mesh::{Correspondence, FaceId, FeatureEdge, Part, RegionId, RegionShape, VertexId, meet};
+use level::{restore_volume, shift};
+use regions::{keep_edges, measure_regions, settle_regions};
+use topipe_mesh::{Correspondence, DVec3, FaceId, Part, RegionId, RegionShape, meet};
 use topipe_progress::Progress;
 
 /// Over the mean edge length: what has moved by less before smoothing was not edited. File formats with decimal numbers round
@@ -71,7 +75,8 @@ pub fn smooth_after(
         return Ok(smoothed);
     }
     if same.is_identity() {
-        return Ok(keep(part, smooth(part, parameters, progress)?, earlier, &new, progress));
+        let smoothed = smooth_alike(part, before, parameters, progress)?;
+        return Ok(keep(part, smoothed, earlier, &new, parameters, progress));
     }
     progress.remark(&format!(
         "{} of {faces} triangles were in the earlier mesh, which had {}",
@@ -79,13 +84,48 @@ pub fn smooth_after(
         original.mesh.face_count()
     ));
     let (order, mesh) = Order::following(&same, &part.mesh);
-    let smoothed = order.restore(part, smooth(&order.apply(part, mesh), parameters, progress)?);
+    let smoothed = order.restore(part, smooth_alike(&order.apply(part, mesh), before, parameters, progress)?);
     let [original, before] = [original, before].map(|earlier| same.restated(earlier, &part.mesh));
-    Ok(keep(part, smoothed, Earlier { original: &original, smoothed: &before }, &new, progress))
+    Ok(keep(part, smoothed, Earlier { original: &original, smoothed: &before }, &new, parameters, progress))
+}
+
+/// Smooths with the `alpha` that the earlier smoothing has found, and with as many iterations as it would have needed: both depend on the
+/// whole mesh, and vertices everywhere move with them.
+fn smooth_alike(
+    part: &Part,
+    before: &Part,
+    parameters: &Parameters,
+    progress: &Progress,
+) -> Result<Part, SmoothingError> {
+    let record = before.smoothing.as_ref().filter(|record| record.method == parameters.method.name());
+    let Some(record) = record else { return smooth(part, parameters, progress) };
+    let alpha = parameters.alpha.or(record.alpha.filter(|alpha| (0.0..=1.0).contains(alpha)));
+    let at_rest = record.rms_steps.iter().position(|step| *step < parameters.tolerance);
+    let iterations =
+        at_rest.and_then(|k| u32::try_from(k + 1).ok()).filter(|n| *n <= parameters.most_iterations());
+    let tolerance = if iterations.is_some() { 0.0 } else { parameters.tolerance };
+    let alike = Parameters {
+        alpha,
+        tolerance,
+        iterations: iterations.or(parameters.iterations),
+        ..parameters.clone()
+    };
+    let mut smoothed = smooth(part, &alike, progress)?;
+    if let Some(record) = &mut smoothed.smoothing {
+        record.converged |= iterations.is_some();
+    }
+    Ok(smoothed)
 }
 
 /// Puts back what has hardly moved. Triangles that are `new` were edited.
-fn keep(part: &Part, smoothed: Part, earlier: Earlier<'_>, new: &[FaceId], progress: &Progress) -> Part {
+fn keep(
+    part: &Part,
+    smoothed: Part,
+    earlier: Earlier<'_>,
+    new: &[FaceId],
+    parameters: &Parameters,
+    progress: &Progress,
+) -> Part {
     let before = earlier.smoothed;
     let edge = before.mesh.mean_edge_length();
     let vertices = part.mesh.vertex_count();
@@ -101,6 +141,8 @@ fn keep(part: &Part, smoothed: Part, earlier: Earlier<'_>, new: &[FaceId], progr
         t.iter().for_each(|v| untouched[v.index()] = false);
     }
     let mut kept = smoothed;
+    let shift = shift(&kept, before, &untouched);
+    let normals = before.mesh.vertex_normals();
     let settled = settle_regions(&mut kept, before, &untouched, NEXT_TO_NOTHING * edge);
     // The shapes that each vertex lies on.
     let mut shapes: Vec<Vec<RegionId>> = vec![Vec::new(); vertices];
@@ -117,7 +159,8 @@ fn keep(part: &Part, smoothed: Part, earlier: Earlier<'_>, new: &[FaceId], progr
         let on = || shapes[v].iter().map(|r| (&kept.regions[r.index()].shape, settled[r.index()]));
         let lies_on =
             |(shape, settled): (&RegionShape, bool)| settled && shape.distance(old).abs() <= ON * edge;
-        if untouched[v] && new.distance(old) <= NEXT_TO_NOTHING * edge && on().all(lies_on) {
+        let shift = if kept.frozen[v] { DVec3::ZERO } else { normals[v] * shift };
+        if untouched[v] && new.distance(old + shift) <= NEXT_TO_NOTHING * edge && on().all(lies_on) {
             farthest = farthest.max(new.distance(old));
             same[v] = true;
             kept.mesh.positions[v] = old;
@@ -138,141 +181,21 @@ fn keep(part: &Part, smoothed: Part, earlier: Earlier<'_>, new: &[FaceId], progr
         same.iter().filter(|s| **s).count(),
     ));
     let volume = part.mesh.volume();
+    if parameters.keeps_volume() {
+        let loose: Vec<bool> =
+            (0..vertices).map(|v| !same[v] && !kept.frozen[v] && shapes[v].is_empty()).collect();
+        if let Some(offset) = restore_volume(&mut kept.mesh, &loose, volume) {
+            progress.remark(&format!(
+                "an offset by {:.1e} edges of what does not stay gives the volume back",
+                offset / edge
+            ));
+        }
+    }
     let off = (kept.mesh.volume() - volume).abs() / volume.abs();
-    if off > VOLUME {
+    if parameters.keeps_volume() && off > VOLUME {
         progress.warn(&format!(
             "the volume is off by {off:.1e} of itself, because what the edit has not touched stays where it was; without `earlier` it is kept"
         ));
     }
     kept
-}
-
-/// Gives regions the order and the shapes of the earlier ones with most of the same faces. Returns for each whether its shape is the
-/// earlier one: at least half of its faces are untouched, and these are as near to it as makes no difference.
-///
-/// Faces of which nothing was edited are of the regions they were of as well, as far as these still have the same shape: at a threshold
-/// detection may decide otherwise for next to nothing.
-fn settle_regions(kept: &mut Part, before: &Part, untouched: &[bool], near: f64) -> Vec<bool> {
-    let mut common: BTreeMap<(RegionId, RegionId), usize> = BTreeMap::new();
-    for (&new, &old) in kept.region_of_face.iter().zip(&before.region_of_face) {
-        if new.is_some() && old.is_some() {
-            *common.entry((new, old)).or_default() += 1;
-        }
-    }
-    // The one with most common faces, the first of several.
-    let counterpart = |own: &dyn Fn(&(RegionId, RegionId)) -> Option<RegionId>| {
-        let candidates = common.iter().filter_map(|(pair, &count)| Some((count, own(pair)?)));
-        candidates.max_by_key(|&(count, other)| (count, std::cmp::Reverse(other))).map(|(_, other)| other)
-    };
-    let pairs: Vec<Option<RegionId>> = (0..kept.regions.len())
-        .map(RegionId::new)
-        .map(|new| {
-            let old = counterpart(&|&(a, b)| (a == new).then_some(b))?;
-            (counterpart(&|&(a, b)| (b == old).then_some(a)) == Some(new)).then_some(old)
-        })
-        .collect();
-    let old_shape = |region: RegionId| -> Option<&RegionShape> {
-        let old = *pairs.get(region.index())?;
-        Some(&before.regions[old?.index()].shape)
-    };
-    let mut settled: Vec<bool> = pairs.iter().map(Option::is_some).collect();
-    // Faces of each that the edit has not touched, less those that it has.
-    let mut surplus = vec![0i64; pairs.len()];
-    for (f, &region) in kept.region_of_face.iter().enumerate() {
-        let Some(shape) = old_shape(region) else { continue };
-        let own = &mut settled[region.index()];
-        *own &= same_kind(shape, &kept.regions[region.index()].shape);
-        let t = kept.mesh.triangles[f];
-        let is_untouched = t.iter().all(|v| untouched[v.index()]);
-        if is_untouched {
-            *own &= t.iter().all(|&v| shape.distance(kept.mesh.position(v)).abs() <= near);
-        }
-        surplus[region.index()] += if is_untouched { 1 } else { -1 };
-    }
-    settled.iter_mut().zip(&surplus).for_each(|(settled, &surplus)| *settled &= surplus >= 0);
-    // What was moved off a shape that stays does not belong to it any more.
-    for f in 0..kept.region_of_face.len() {
-        let region = kept.region_of_face[f];
-        let Some(shape) = old_shape(region).filter(|_| settled[region.index()]) else { continue };
-        let is_off = |v: &VertexId| {
-            let most = if kept.frozen[v.index()] { near * ON / NEXT_TO_NOTHING } else { near };
-            !untouched[v.index()] && shape.distance(kept.mesh.position(*v)).abs() > most
-        };
-        if kept.mesh.triangles[f].iter().any(is_off) {
-            kept.region_of_face[f] = RegionId::NONE;
-        }
-    }
-    for (new, old) in pairs.iter().enumerate() {
-        if let Some(old) = old.filter(|_| settled[new]) {
-            kept.regions[new].shape = before.regions[old.index()].shape;
-        }
-    }
-    // In the order of the earlier ones; what is new comes last.
-    let mut order: Vec<usize> = (0..kept.regions.len()).collect();
-    order.sort_by_key(|&new| (pairs[new].is_none(), pairs[new], new));
-    let mut number = vec![RegionId::NONE; order.len()];
-    order.iter().enumerate().for_each(|(k, &new)| number[new] = RegionId::new(k));
-    let now: BTreeMap<RegionId, RegionId> = (0..number.len())
-        .filter(|&new| settled[new])
-        .filter_map(|new| Some((pairs[new]?, number[new])))
-        .collect();
-    for (f, region) in kept.region_of_face.iter_mut().enumerate() {
-        let mut may_change = kept.mesh.triangles[f].iter().all(|v| untouched[v.index()]);
-        if region.is_some() {
-            may_change &= settled[region.index()];
-            *region = number[region.index()];
-        }
-        let old = before.region_of_face[f];
-        if may_change {
-            match now.get(&old) {
-                Some(&own) => *region = own,
-                None if !old.is_some() => *region = RegionId::NONE,
-                None => {}
-            }
-        }
-    }
-    kept.regions = order.iter().map(|&new| kept.regions[new].clone()).collect();
-    order.iter().map(|&new| settled[new]).collect()
-}
-
-fn same_kind(a: &RegionShape, b: &RegionShape) -> bool {
-    match (a, b) {
-        (RegionShape::Plane { .. }, RegionShape::Plane { .. }) => true,
-        (RegionShape::Cylinder { hole, .. }, RegionShape::Cylinder { hole: other, .. }) => hole == other,
-        _ => false,
-    }
-}
-
-/// Edges between vertices that were put back are features where they were.
-fn keep_edges(kept: &mut Part, before: &Part, same: &[bool]) {
-    let is_same = |edge: &FeatureEdge| edge.vertices.iter().all(|v| same[v.index()]);
-    let mut edges: Vec<_> = kept.feature_edges.iter().filter(|edge| !is_same(edge)).copied().collect();
-    edges.extend(before.feature_edges.iter().filter(|edge| is_same(edge)));
-    edges.sort_unstable_by_key(|edge| edge.vertices);
-    kept.feature_edges = edges;
-}
-
-/// Area and residual of regions some of whose vertices have moved; those of the others are what they were.
-fn measure_regions(kept: &mut Part, before: &Part, same: &[bool]) {
-    let mut changed = BTreeSet::new();
-    for (f, &region) in kept.region_of_face.iter().enumerate() {
-        let moved = kept.mesh.triangles[f].iter().any(|v| !same[v.index()]);
-        if region.is_some() && (moved || before.region_of_face[f] != region) {
-            changed.insert(region);
-        }
-    }
-    for (k, region) in kept.regions.iter_mut().enumerate() {
-        let id = RegionId::new(k);
-        if let Some(before) = before.regions.get(k).filter(|_| !changed.contains(&id)) {
-            region.clone_from(before);
-            continue;
-        }
-        (region.area, region.residual) = (0.0, 0.0);
-        for f in kept.mesh.faces().filter(|f| kept.region_of_face[f.index()] == id) {
-            region.area += kept.mesh.area_vector(f).length() / 2.0;
-            for p in kept.mesh.corners(f) {
-                region.residual = region.residual.max(region.shape.distance(p).abs());
-            }
-        }
-    }
 }

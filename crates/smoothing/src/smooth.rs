@@ -290,6 +290,7 @@ fn iterate(
         }
     }
     let parameters = &settle_alpha(parameters, domain, original, edge, progress);
+    record.alpha = parameters.alpha.filter(|_| matches!(parameters.method, Method::Hc | Method::HcSdu));
     let guard = OutlineGuard::new(mesh, features, domain);
     let setup = Run { mesh, domain, guard: &guard, edge, free };
     let mut current = run(&setup, parameters, progress, record, observe)?;

@@ -66,6 +66,16 @@ impl VolumeKeeper {
         keeper
     }
 
+    /// Restores the volume `wanted` along these directions.
+    pub(crate) fn along(mesh: &TriangleMesh, directions: Vec<DVec3>, wanted: f64) -> Self {
+        let (low, high) = mesh.bounds();
+        let center = (low + high) / 2.0;
+        let moves = |t: &&[VertexId; 3]| t.iter().any(|v| directions[v.index()] != DVec3::ZERO);
+        let (moving, still): (Vec<_>, Vec<_>) = mesh.triangles.iter().partition(moves);
+        let still = six_volumes(&still, center, &mesh.positions);
+        Self { moving, still, center, wanted, directions, slides: Vec::new() }
+    }
+
     /// The volume of the mesh it was made for.
     pub(crate) fn wanted(&self) -> f64 {
         self.wanted
@@ -109,7 +119,7 @@ impl VolumeKeeper {
         reach: f64,
     ) -> Result<f64, f64> {
         self.aim(domain, positions);
-        self.offset(positions, reach)
+        self.offset(positions, reach).map(|(_, volume)| volume)
     }
 
     /// As [`Self::restore`], then measures the volume and takes out what rounding left. Returns the measured volume.
@@ -155,8 +165,9 @@ impl VolumeKeeper {
         );
     }
 
-    /// One round along the directions: solves the cubic and moves.
-    fn offset(&self, positions: &mut [DVec3], reach: f64) -> Result<f64, f64> {
+    /// One round along the directions: solves the cubic and moves. Returns how far and the volume there, or `Err` with the present
+    /// volume.
+    pub(crate) fn offset(&self, positions: &mut [DVec3], reach: f64) -> Result<(f64, f64), f64> {
         let cubic = self.cubic(positions);
         let mut tau = 0.0;
         for _ in 0..32 {
@@ -175,6 +186,6 @@ impl VolumeKeeper {
         in_chunks_mut(positions, |base, chunk| {
             chunk.iter_mut().zip(&self.directions[base..]).for_each(|(p, d)| *p += tau * *d);
         });
-        Ok(value(cubic, tau))
+        Ok((tau, value(cubic, tau)))
     }
 }

@@ -469,7 +469,7 @@ pub struct ManArguments {
 pub struct EditArguments {
     /// The pipeline of the part before the edit.
     pub pipeline: PathBuf,
-    /// The edited mesh, with the triangles of the earlier one in the same order [default: the earlier one].
+    /// The edited mesh. Triangles that the earlier one has too may be in another order [default: the earlier one].
     pub mesh: Option<PathBuf>,
     /// The pipeline to write, in the same folder [default: the mesh's name with .toml, or the pipeline's with -edited].
     #[arg(short, long, value_name = "FILE")]

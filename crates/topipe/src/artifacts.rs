@@ -19,11 +19,11 @@ macro_rules! kinds {
 
 kinds! {
     /// A triangle mesh with its labels, features and provenance.
-    Mesh = "mesh" v 2: topipe_mesh::Part;
+    Mesh = "mesh" v 3: topipe_mesh::Part;
     /// A partition of a mesh into disks.
-    Tiling = "tiling" v 1: topipe_tiling::Tiling;
+    Tiling = "tiling" v 2: topipe_tiling::Tiling;
     /// A partition of a mesh into quadrilaterals.
-    QuadLayout = "quad layout" v 2: topipe_quad_matching::QuadLayout;
+    QuadLayout = "quad layout" v 3: topipe_quad_matching::QuadLayout;
     /// A closed surface of B-spline patches.
     SplineSurface = "spline surface" v 3: topipe_spline_fit::SplineSurface;
     /// A curve skeleton.

@@ -2,7 +2,7 @@
 
 use super::{ImportError, ImportOptions, NonDesignRegion, Source, soup};
 use crate::spatial::SurfaceIndex;
-use crate::{Design, TriangleMesh, VertexId};
+use crate::{Correspondence, Design, FaceId, Part, TriangleMesh, VertexId};
 use glam::DVec3;
 
 /// Reads one 0 or 1 per line.
@@ -26,6 +26,32 @@ pub(super) fn parse(name: &str, bytes: &[u8]) -> Result<Vec<Design>, ImportError
         });
     }
     Ok(labels)
+}
+
+/// Over the mean edge length of the earlier mesh: a new face whose middle is nearer to a face of it may lie on that. Holes of twelve edges
+/// around, made anew with six, are a fifth of an edge from where they were.
+const ON: f64 = 0.25;
+
+/// The cosine of the angle, 30 degrees, by which their normals may differ.
+const TURNED: f64 = 0.866;
+
+/// The labels that the faces of `mesh` had in an earlier version. New ones have that of the face on which they lie, if there is one.
+pub(super) fn of_earlier(earlier: &Part, mesh: &TriangleMesh) -> Vec<Design> {
+    let same = Correspondence::new(&earlier.mesh, mesh).ok();
+    let mut index = None;
+    let limit = ON * earlier.mesh.mean_edge_length();
+    mesh.faces()
+        .map(|f| {
+            let was = same.as_ref().map_or(FaceId::NONE, |same| same.face_was(f));
+            if was.is_some() {
+                return earlier.design[was.index()];
+            }
+            let index = index.get_or_insert_with(|| SurfaceIndex::build(&earlier.mesh));
+            let below = index.nearest_within(mesh.centroid(f), limit).map(|nearest| nearest.face);
+            let along = |g: &FaceId| mesh.normal(f).dot(earlier.mesh.normal(*g)) > TURNED;
+            below.filter(along).map_or(Design::Design, |g| earlier.design[g.index()])
+        })
+        .collect()
 }
 
 /// A region, ready to be asked.

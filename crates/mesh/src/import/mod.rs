@@ -58,6 +58,8 @@ pub struct Source<'a> {
     pub bytes: &'a [u8],
     /// Name and content of the label file: one 0 or 1 per face of the mesh file, in its order; 1 is non-design.
     pub labels: Option<(&'a str, &'a [u8])>,
+    /// An earlier version of the mesh, in mm, which lends its labels: see [`read_source`].
+    pub earlier: Option<&'a Part>,
     /// Contents of the files named by [`ImportOptions::region_files`].
     pub region_files: BTreeMap<String, &'a [u8]>,
 }
@@ -65,7 +67,7 @@ pub struct Source<'a> {
 impl<'a> Source<'a> {
     /// A mesh file alone.
     pub fn new(name: &'a str, bytes: &'a [u8]) -> Self {
-        Self { name, bytes, labels: None, region_files: BTreeMap::new() }
+        Self { name, bytes, labels: None, earlier: None, region_files: BTreeMap::new() }
     }
 }
 
@@ -75,6 +77,9 @@ pub fn read(name: &str, bytes: &[u8], options: &ImportOptions) -> Result<Part, I
 }
 
 /// Reads a mesh file, its labels and regions, and repairs what can be repaired.
+///
+/// Where it has no labels of its own, faces have those that they had in an earlier version, see [`Correspondence`](crate::Correspondence);
+/// new ones that lie on a face of it, that of this one, and others are design.
 pub fn read_source(
     source: &Source<'_>,
     options: &ImportOptions,
@@ -157,6 +162,8 @@ pub fn read_source(
     part.import = ImportRecord { format, scale_to_mm: factor, repairs: draft.repairs };
     if let Some(labels) = labels {
         part.design = draft.face_of.iter().map(|&f| labels[f as usize]).collect();
+    } else if let Some(earlier) = source.earlier {
+        part.design = labels::of_earlier(earlier, &part.mesh);
     }
     labels::mark_regions(&part.mesh, source, options, &mut part.design)?;
     progress.step(STEPS, STEPS, "done");

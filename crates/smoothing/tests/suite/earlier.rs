@@ -34,6 +34,8 @@ fn bumped(part: &Part, before: &Part, share: f64, radius: f64, height: f64) -> (
 
 #[test]
 fn what_is_far_from_an_edit_keeps_its_bits() {
+    // Edits after which the volume is what it was to the last digits.
+    let mut exact = 0;
     for case in CASES {
         let part = read(case);
         let before = smoothed(&part, &Parameters::default());
@@ -69,9 +71,12 @@ fn what_is_far_from_an_edit_keeps_its_bits() {
                 if shape(&now, f) == shape(&before, f) { same += 1 } else { other += 1 }
             }
             assert!(50 * other < same, "{case}: {other} faces in other shapes, {same} in the same");
-            assert!((now.mesh.volume() / edited.mesh.volume() - 1.0).abs() < 4e-3);
+            let off = (now.mesh.volume() / edited.mesh.volume() - 1.0).abs();
+            assert!(off < if warned.is_empty() { 1e-3 } else { 4e-3 }, "{case}: {off:e}");
+            exact += usize::from(off < 1e-12);
         }
     }
+    assert!(exact >= 12, "{exact} of 18");
 }
 
 #[test]

@@ -124,6 +124,14 @@ fn edited(mut spec: Table, registry: &Registry, mesh: Option<&str>, name: &str) 
             ));
         };
         set(&mut now[import], "path", path.into());
+        // Labels are those of the earlier mesh, face by face; the edited one may have others in another order.
+        let labels = ["labels", "earlier"].iter().filter(|name| field(&stages, import, name).is_some());
+        if labels.count() > 0 {
+            if let Value::Table(import) = &mut now[import] {
+                import.remove("labels");
+            }
+            set(&mut now[import], "earlier", copied(import));
+        }
     }
     for smoothing in of_kind(&["smoothing"], &before) {
         if let Some(input) = field(&stages, &smoothing, "input") {

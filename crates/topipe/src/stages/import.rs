@@ -19,7 +19,10 @@ impl Stage for Import {
     }
 
     fn inputs(&self) -> Vec<InputPort> {
-        Vec::new()
+        vec![InputPort::optional::<Mesh>(
+            "earlier",
+            "An earlier version of the mesh: faces have the labels that they have there.",
+        )]
     }
 
     fn files(&self) -> Vec<FileField> {
@@ -54,7 +57,13 @@ impl Stage for Import {
             }
         }
         let labels = context.file("labels").map(|file| (file.name.as_str(), &*file.bytes));
-        let source = Source { name: &mesh.name, bytes: &mesh.bytes, labels, region_files };
+        let earlier = context.optional_input::<Mesh>("earlier")?;
+        if labels.is_some() && earlier.is_some() {
+            let message = "`labels` says which faces are non-design, and `earlier` does too: name one";
+            return Err(StageError::BadParameter(message.into()));
+        }
+        let earlier = earlier.as_deref();
+        let source = Source { name: &mesh.name, bytes: &mesh.bytes, labels, earlier, region_files };
         let part = read_source(&source, options, context.progress()).map_err(|error| match error {
             ImportError::Interrupted(_) => StageError::Interrupted,
             ImportError::Option { .. } => StageError::BadParameter(error.to_string()),
