@@ -84,6 +84,74 @@ fn an_edit_of_the_mesh_costs_what_it_touches() {
     assert!(computed > 0 && 3 * computed < reused, "{computed} computed, {reused} reused");
 }
 
+/// The edited file has its triangles in another order, one of them divided, and no labels of its own.
+#[test]
+fn an_edited_mesh_may_have_other_triangles() {
+    let shop = Workshop::with_part("y-form", "");
+    std::fs::rename(shop.path("part.stl"), shop.path("arm.stl")).unwrap();
+    let labels = format!("{}/../../fixtures/y-form/y-form.labels.csv", env!("CARGO_MANIFEST_DIR"));
+    std::fs::copy(labels, shop.path("arm.csv")).unwrap();
+    assert_eq!(shop.topipe(&["new", "arm.stl"]).code, 0);
+    let spec = shop.read("arm.toml");
+    let labelled = spec.replace("path = \"arm.stl\"", "path = \"arm.stl\"\nlabels = \"arm.csv\"");
+    assert_ne!(spec, labelled);
+    shop.write("arm.toml", &labelled);
+    let run = shop.topipe(&["run", "arm.toml"]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+
+    bump(&shop, "arm.stl", "rib.stl", 1200, 4.0, 0.3);
+    let bytes = std::fs::read(shop.path("rib.stl")).unwrap();
+    let mut records: Vec<Vec<u8>> = bytes[84..].chunks(50).map(<[u8]>::to_vec).collect();
+    let corner = |record: &[u8], k: usize| -> [f32; 3] {
+        [0, 1, 2].map(|axis| {
+            let at = 12 + 12 * k + 4 * axis;
+            f32::from_le_bytes(record[at..at + 4].try_into().unwrap())
+        })
+    };
+    let whole = records.remove(1200);
+    let corners = [0, 1, 2].map(|k| corner(&whole, k));
+    let middle = [0, 1, 2].map(|axis| corners.iter().map(|p| p[axis] / 3.0).sum::<f32>());
+    for k in 0..3 {
+        let mut piece = whole.clone();
+        let at = 12 + 12 * k;
+        for (axis, x) in middle.iter().enumerate() {
+            piece[at + 4 * axis..at + 4 * axis + 4].copy_from_slice(&x.to_le_bytes());
+        }
+        records.push(piece);
+    }
+    records.reverse();
+    let mut edited = bytes[..80].to_vec();
+    edited.extend((records.len() as u32).to_le_bytes());
+    records.iter().for_each(|record| edited.extend(record));
+    std::fs::write(shop.path("rib.stl"), edited).unwrap();
+
+    assert_eq!(shop.topipe(&["edit", "arm.toml", "rib.stl"]).code, 0);
+    let spec = shop.read("rib.toml");
+    assert!(spec.contains("earlier = \"mesh-1\"") && spec.matches("arm.csv").count() == 1, "{spec}");
+    let (_, [reused, computed]) = ran(&shop, "rib.toml");
+    assert!(computed > 0 && 3 * computed < reused, "{computed} computed, {reused} reused");
+    let report = |name: &str| -> Value {
+        serde_json::from_str(&shop.read(&format!("topipe-out/{name}/report.json"))).unwrap()
+    };
+    let [before, now] = ["arm", "rib"].map(report);
+    assert_eq!(now["surface"]["closed"], true);
+    assert!(now["smoothing"]["volume_error"].as_f64().unwrap().abs() < 1e-12);
+    // As many vertices of non-design faces are held as before.
+    let frozen = |report: &Value| report["smoothing"]["frozen_vertices"].as_u64().unwrap();
+    assert!(frozen(&now) > 500 && frozen(&now).abs_diff(frozen(&before)) < 10);
+
+    // Once more: labels still come from the first file.
+    bump(&shop, "rib.stl", "boss.stl", 300, 4.0, 0.3);
+    assert_eq!(shop.topipe(&["edit", "rib.toml", "boss.stl"]).code, 0);
+    let (_, [reused, computed]) = ran(&shop, "boss.toml");
+    assert!(computed > 0 && 3 * computed < reused, "{computed} computed, {reused} reused");
+    // Both are one too many.
+    let twice = spec.replace("earlier = \"mesh-1\"", "earlier = \"mesh-1\"\nlabels = \"arm.csv\"");
+    shop.write("rib.toml", &twice);
+    let run = shop.topipe(&["run", "rib.toml"]);
+    assert!(run.code == 2 && run.stderr.contains("name one"), "{}", run.stderr);
+}
+
 #[test]
 fn an_edit_of_nothing_costs_nothing() {
     let shop = y_form();
