@@ -10,6 +10,7 @@
 pub mod coarsen;
 mod connectivity;
 mod correspondence;
+mod counterparts;
 mod csr;
 mod curvature;
 pub mod disk_map;
@@ -29,6 +30,7 @@ pub mod write;
 
 pub use connectivity::{Connectivity, ConnectivityError};
 pub use correspondence::Correspondence;
+pub use counterparts::counterparts;
 pub use glam::{DMat3, DVec3};
 pub use ids::{FaceId, HalfEdgeId, RegionId, VertexId};
 pub use lineage::Lineage;

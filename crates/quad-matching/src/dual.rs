@@ -6,7 +6,7 @@ use crate::refine::{Quads, Regions, refine};
 use crate::sides::{FeaturePath, TileSide, Tiled, feature_paths, midpoints, tile_sides};
 use crate::spokes::{self, SpokeTask};
 use crate::straighten::straighten;
-use crate::{MacroEdge, Pairing, Parameters, QuadLayout, QuadMatchingError, Side};
+use crate::{Lengths, MacroEdge, Pairing, Parameters, QuadLayout, QuadMatchingError, Side};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};
 use topipe_mesh::{FaceId, HalfEdgeId, Part, VertexId};
@@ -124,6 +124,7 @@ pub fn match_quads(
     };
     let (part, _): (Part, Vec<FaceId>) = quads.tiled.refiner.finish();
     let mut layout = QuadLayout {
+        lengths: Lengths::of(&part.mesh),
         part,
         vertices: quads.vertices,
         edges: quads.edges,

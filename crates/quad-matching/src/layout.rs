@@ -2,7 +2,7 @@
 
 use crate::cost::within_gates;
 use crate::pairing::face_angle;
-use crate::{Parameters, QuadMatchingError};
+use crate::{Lengths, Parameters, QuadMatchingError};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use topipe_mesh::{FeatureKind, HalfEdgeId, Part, RegionId, VertexId};
@@ -58,6 +58,8 @@ pub struct QuadLayout {
     pub quad_of_face: Vec<u32>,
     /// The regions that are faces of their own.
     pub region_faces: Vec<RegionFace>,
+    /// Of the part it was first made for.
+    pub lengths: Lengths,
     /// Number of tiles of the tessellation this layout is the dual of.
     pub tiles: u32,
     /// Number of macro-triangles that were matched.

@@ -10,7 +10,7 @@ use crate::ends::turn_ends;
 use crate::outlines::outlines;
 use crate::refine::{Quads, Regions, refine};
 use crate::relax::{Effort, Incidence, relax};
-use crate::{Parameters, QuadLayout, QuadMatchingError, RegionFace, Side};
+use crate::{Lengths, Parameters, QuadLayout, QuadMatchingError, RegionFace, Side};
 use rustc_hash::FxHashSet;
 use topipe_mesh::VertexId;
 use topipe_progress::Progress;
@@ -69,6 +69,7 @@ pub(crate) fn subdivide(
     let refiner = (!wide.is_empty()).then(|| tiled.refiner.clone());
     let (part, _) = tiled.refiner.finish();
     let mut layout = QuadLayout {
+        lengths: Lengths::of(&part.mesh),
         part,
         vertices,
         edges,

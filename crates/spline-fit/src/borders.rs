@@ -20,8 +20,8 @@ mod tangency;
 use tangency::PlaneBeside;
 
 use crate::{AnalyticFace, EdgeCurve, PatchSide, SplineFitError};
-use topipe_mesh::{Connectivity, DVec3, RegionId, RegionShape, TriangleMesh, meet};
-use topipe_quad_matching::QuadLayout;
+use topipe_mesh::{Connectivity, DVec3, RegionId, RegionShape, meet};
+use topipe_quad_matching::{Lengths, QuadLayout};
 
 /// Curves stay within this share of the part's diagonal of the shapes they lie on: 1e-7 mm on a part of 200 mm.
 const TOLERANCE: f64 = 5e-10;
@@ -50,7 +50,7 @@ pub(crate) struct Borders {
 /// `connectivity` is that of the layout's mesh. Fails when the layout's arrays do not fit together.
 pub(crate) fn borders(layout: &QuadLayout, connectivity: &Connectivity) -> Result<Borders, SplineFitError> {
     let sides = sides(layout)?;
-    let diagonal = rounded(layout.part.mesh.diagonal());
+    let Lengths { diagonal, edge: grain } = layout.lengths;
     let tolerance = TOLERANCE * diagonal;
     let shapes = shapes(layout, &sides, tolerance);
     let faces = layout
@@ -95,7 +95,6 @@ pub(crate) fn borders(layout: &QuadLayout, connectivity: &Connectivity) -> Resul
             shape,
         });
     }
-    let grain = grain(&layout.part.mesh);
     let room = room(layout, &sides);
     for chain in chains::chains(layout, &sides, &borders.curves, grain) {
         outline::fit(layout, &chain, &shapes[chain.region.index()], grain, diagonal, &room, &mut borders);
@@ -118,25 +117,6 @@ fn room(layout: &QuadLayout, sides: &[Beside]) -> Vec<f64> {
         }
     }
     room
-}
-
-/// The length of an edge of a face at a random place of the surface, mm. Cuts leave many short edges beside them, which
-/// hardly count here: it is about the mean edge length of the mesh before it was cut.
-fn grain(mesh: &TriangleMesh) -> f64 {
-    let (mut sum, mut area) = (0.0, 0.0);
-    for f in mesh.faces() {
-        let [a, b, c] = mesh.corners(f);
-        let weight = mesh.area_vector(f).length();
-        sum += weight * (a.distance(b) + b.distance(c) + c.distance(a)) / 3.0;
-        area += weight;
-    }
-    if sum > 0.0 && area > 0.0 { rounded(sum / area) } else { 0.0 }
-}
-
-/// A length rounded to a 64th of an octave. All borders depend on some lengths of the whole part, and where a mesh is edited or
-/// divided in one place those of other places shall stay what they are.
-fn rounded(length: f64) -> f64 {
-    if length > 0.0 { ((64.0 * length.log2()).round() / 64.0).exp2() } else { 0.0 }
 }
 
 /// The regions beside an edge: of the loop that runs along it, and of the loop that runs against it.
@@ -246,7 +226,7 @@ mod tests {
     use crate::CurveShape;
     use glam::DMat3;
     use std::f64::consts::TAU;
-    use topipe_mesh::{Part, Region, VertexId};
+    use topipe_mesh::{Part, Region, TriangleMesh, VertexId};
     use topipe_quad_matching::{MacroEdge, RegionFace, Side};
 
     fn borders(layout: &QuadLayout) -> Result<Borders, SplineFitError> {
@@ -305,6 +285,7 @@ mod tests {
             if reversed { sides.rev().collect() } else { sides.collect() }
         };
         QuadLayout {
+            lengths: Lengths::of(&part.mesh),
             vertices: (0..12).map(|v| VertexId(at(v / 4, v % 4 * quarter))).collect(),
             edges,
             quads: Vec::new(),

@@ -4,6 +4,7 @@ use crate::{Basis, SplineFitError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use topipe_mesh::TriangleMesh;
+use topipe_quad_matching::Lengths;
 
 /// How patches meet along edges that are not features.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
@@ -102,20 +103,28 @@ impl Default for Parameters {
 impl Parameters {
     /// The narrower of both tolerances, mm.
     pub(crate) fn largest_distance(&self, mesh: &TriangleMesh) -> f64 {
-        (self.tolerance * mesh.diagonal()).min(self.tolerance_mm.unwrap_or(f64::INFINITY))
+        self.largest(mesh.diagonal())
+    }
+
+    fn largest(&self, diagonal: f64) -> f64 {
+        (self.tolerance * diagonal).min(self.tolerance_mm.unwrap_or(f64::INFINITY))
     }
 
     /// The distance from which on knots are inserted and patches drawn nearer, mm.
     pub(crate) fn refined_distance(&self, mesh: &TriangleMesh) -> f64 {
-        let tolerance = self.largest_distance(mesh);
-        (KNOTS * tolerance).max(FINE * mesh.diagonal()).min(tolerance)
+        self.refined(mesh.diagonal())
+    }
+
+    fn refined(&self, diagonal: f64) -> f64 {
+        let tolerance = self.largest(diagonal);
+        (KNOTS * tolerance).max(FINE * diagonal).min(tolerance)
     }
 
     /// A patch all of whose samples are this near, mm, needs no more corrections of their foot points. [`Self::refined_distance`],
     /// rounded down to a quarter of an octave: patches are kept under keys in which it counts, and an edit that changes the size of
     /// the part a little shall find them again.
-    pub(crate) fn near_enough(&self, mesh: &TriangleMesh) -> f64 {
-        let tolerance = self.refined_distance(mesh);
+    pub(crate) fn near_enough(&self, lengths: &Lengths) -> f64 {
+        let tolerance = self.refined(lengths.diagonal);
         if tolerance > 0.0 { ((4.0 * tolerance.log2()).floor() / 4.0).exp2() } else { 0.0 }
     }
 

@@ -361,7 +361,7 @@ mod tests {
         setting.make_corners(&samples, 4, &progress);
         let starts = samples.iter().map(|samples| places(samples).into()).collect();
         let (setting, units) = (&setting, &Units::none());
-        let near_enough = parameters.near_enough(&layout.part.mesh);
+        let near_enough = parameters.near_enough(&layout.lengths);
         let (parameters, progress) = (&parameters, &progress);
         let patches = Patches { setting, parameters, near_enough, units, progress, starts, samples: vec![] };
         let refined = layout.edges.len() / 2;

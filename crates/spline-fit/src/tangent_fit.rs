@@ -123,7 +123,7 @@ impl<'a> Fit<'a> {
                 (refinement, known, Some(before.round.carried(&common.quads)))
             }
         };
-        let near_enough = parameters.near_enough(&layout.part.mesh);
+        let near_enough = parameters.near_enough(&layout.lengths);
         let patches =
             Patches { setting: &setting, parameters, near_enough, units, progress, starts, samples: keys };
         let mut round = loop {
@@ -279,7 +279,7 @@ pub(crate) fn first_patches(
     )?;
     let keys = samples.par_iter().map(|samples| key_of(samples)).collect();
     let (units, starts) = (&Units::none(), Vec::new());
-    let near_enough = parameters.near_enough(&setting.layout.part.mesh);
+    let near_enough = parameters.near_enough(&setting.layout.lengths);
     let progress = &progress;
     let patches =
         Patches { setting: &setting, parameters, near_enough, units, progress, starts, samples: keys };

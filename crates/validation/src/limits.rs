@@ -39,6 +39,11 @@ pub(crate) fn check(
             at,
         });
     }
+    if let Some(limit) = parameters.max_gap_mm {
+        let value = surface.gap_mm;
+        let kept = value <= limit;
+        limits.push(LimitFigures { figure: "surface.gap_mm".into(), value, limit, kept, at: None });
+    }
     let broken: Vec<String> = limits.iter().filter(|l| !l.kept).map(LimitFigures::describe).collect();
     if parameters.require && !broken.is_empty() {
         return Err(ValidationError::Limits { broken: broken.join("; ") });

@@ -18,6 +18,8 @@ pub struct Parameters {
     pub max_deviation: Option<f64>,
     /// Largest angle between the normals on both sides of an edge that is no feature, degrees.
     pub max_normal_jump: Option<f64>,
+    /// Largest gap between two faces along the edge that they share, mm.
+    pub max_gap_mm: Option<f64>,
     /// A broken limit is an error: the run ends with exit code 1.
     pub require: bool,
 }
@@ -29,6 +31,7 @@ impl Default for Parameters {
             max_deviation_mm: None,
             max_deviation: None,
             max_normal_jump: None,
+            max_gap_mm: None,
             require: false,
         }
     }
@@ -40,6 +43,7 @@ impl Parameters {
             ("max_deviation_mm", self.max_deviation_mm),
             ("max_deviation", self.max_deviation),
             ("max_normal_jump", self.max_normal_jump),
+            ("max_gap_mm", self.max_gap_mm),
         ];
         for (name, limit) in limits {
             if let Some(value) = limit.filter(|l| !(l.is_finite() && *l >= 0.0)) {

@@ -6,7 +6,7 @@ use topipe_mesh::{
     TriangleMesh, VertexId,
 };
 use topipe_progress::Progress;
-use topipe_quad_matching::{MacroEdge, QuadLayout, Side};
+use topipe_quad_matching::{Lengths, MacroEdge, QuadLayout, Side};
 use topipe_skeleton::{Method, PointKind, Section, Skeleton};
 use topipe_spline_fit::{Basis, EdgeCurve, Patch, PatchSide, SplineSurface};
 use topipe_validation::{Inputs, Parameters, Report, ValidationError, validate, volume_by_quadrature};
@@ -394,6 +394,13 @@ fn a_control_point_that_is_not_shared_opens_a_gap_and_a_missing_patch_the_surfac
     let inputs = Inputs { surface: Some(&surface), ..Inputs::of(&original) };
     let figures = validate(&inputs, &parameters, &Progress::silent()).unwrap().surface.unwrap();
     close(figures.gap_mm, 0.005, 1e-12);
+    for (limit, kept) in [(0.006, true), (0.004, false)] {
+        let parameters = Parameters { max_gap_mm: Some(limit), ..parameters.clone() };
+        let report = validate(&inputs, &parameters, &Progress::silent()).unwrap();
+        assert_eq!((report.limits[0].figure.as_str(), report.limits[0].kept), ("surface.gap_mm", kept));
+        let required = validate(&inputs, &Parameters { require: true, ..parameters }, &Progress::silent());
+        assert_eq!(required.is_ok(), kept);
+    }
 
     let mut open = spline_cube(2, 1);
     open.patches.pop();
@@ -417,6 +424,7 @@ fn cube_layout(size: f64) -> QuadLayout {
         })
     });
     QuadLayout {
+        lengths: Lengths::of(&part.mesh),
         part,
         vertices: (0..8).map(VertexId).collect(),
         edges,

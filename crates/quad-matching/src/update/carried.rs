@@ -3,10 +3,11 @@
 use super::Earlier;
 use super::restated::{Restated, restate};
 use crate::cost::within_gates;
-use crate::{QuadLayout, QuadMatchingError};
+use crate::{Lengths, QuadLayout, QuadMatchingError};
 use std::collections::{BTreeMap, BTreeSet};
 use topipe_mesh::{
     Connectivity, Correspondence, FaceId, FeatureEdge, HalfEdgeId, Lineage, Part, RegionId, VertexId,
+    counterparts,
 };
 use topipe_progress::Progress;
 use topipe_tiling::SizingField;
@@ -100,6 +101,7 @@ pub(super) fn carry(
     own.import.clone_from(&part.import);
     own.smoothing.clone_from(&part.smoothing);
     own.feature_edges = features(&own.mesh, parents, part)?;
+    layout.lengths = Lengths::of(&own.mesh).after(before.lengths);
 
     let was: Vec<RegionId> = (0..region.len())
         .map(|f| match before.quad_of_face[f] {
@@ -127,23 +129,6 @@ fn lineage(earlier: Earlier<'_>) -> Option<Lineage> {
     let Some(tiling) = earlier.tiling else { return Lineage::new(layout, mesh) };
     let of_tiling = Lineage::new(&tiling.part, mesh)?;
     of_tiling.of_child(layout, &Lineage::new(layout, &tiling.part.mesh)?, mesh)
-}
-
-/// For each region that was the one with most of the same faces that is now, where that is so both ways.
-fn counterparts(was: &[RegionId], is: &[RegionId]) -> BTreeMap<RegionId, RegionId> {
-    let mut common: BTreeMap<(RegionId, RegionId), usize> = BTreeMap::new();
-    for (&old, &new) in was.iter().zip(is).filter(|(old, new)| old.is_some() && new.is_some()) {
-        *common.entry((old, new)).or_default() += 1;
-    }
-    let mut pairs: Vec<_> = common.into_iter().collect();
-    pairs.sort_by_key(|&(pair, count)| (std::cmp::Reverse(count), pair));
-    let (mut counterpart, mut used) = (BTreeMap::new(), BTreeSet::new());
-    for ((old, new), _) in pairs {
-        if !counterpart.contains_key(&old) && used.insert(new) {
-            counterpart.insert(old, new);
-        }
-    }
-    counterpart
 }
 
 /// Faces of the part beside edges that are features in one of both only, or others.

@@ -68,6 +68,7 @@ pub(super) fn restate(
     let lost = before.quads.len() - quads.len();
     let layout = QuadLayout {
         part: own,
+        lengths: before.lengths,
         vertices: before.vertices.iter().map(moved).collect(),
         edges: before.edges.iter().map(edge).collect(),
         quads,

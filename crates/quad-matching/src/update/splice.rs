@@ -131,6 +131,7 @@ pub(super) fn splice(
         .collect();
     Ok(QuadLayout {
         part: joined,
+        lengths: earlier.lengths,
         vertices,
         edges,
         quads,

@@ -2,7 +2,7 @@
 
 use super::{NEXT_TO_NOTHING, ON};
 use std::collections::{BTreeMap, BTreeSet};
-use topipe_mesh::{FeatureEdge, Part, RegionId, RegionShape, VertexId};
+use topipe_mesh::{FeatureEdge, Part, RegionId, RegionShape, VertexId, counterparts};
 
 /// Gives regions the order and the shapes of the earlier ones with most of the same faces. Returns for each whether its shape is the
 /// earlier one: at least half of its faces are untouched, and these are as near to it as makes no difference.
@@ -10,24 +10,10 @@ use topipe_mesh::{FeatureEdge, Part, RegionId, RegionShape, VertexId};
 /// Faces of which nothing was edited are of the regions they were of as well, as far as these still have the same shape: at a threshold
 /// detection may decide otherwise for next to nothing.
 pub(super) fn settle_regions(kept: &mut Part, before: &Part, untouched: &[bool], near: f64) -> Vec<bool> {
-    let mut common: BTreeMap<(RegionId, RegionId), usize> = BTreeMap::new();
-    for (&new, &old) in kept.region_of_face.iter().zip(&before.region_of_face) {
-        if new.is_some() && old.is_some() {
-            *common.entry((new, old)).or_default() += 1;
-        }
+    let mut pairs: Vec<Option<RegionId>> = vec![None; kept.regions.len()];
+    for (old, new) in counterparts(&before.region_of_face, &kept.region_of_face) {
+        pairs[new.index()] = Some(old);
     }
-    // The one with most common faces, the first of several.
-    let counterpart = |own: &dyn Fn(&(RegionId, RegionId)) -> Option<RegionId>| {
-        let candidates = common.iter().filter_map(|(pair, &count)| Some((count, own(pair)?)));
-        candidates.max_by_key(|&(count, other)| (count, std::cmp::Reverse(other))).map(|(_, other)| other)
-    };
-    let pairs: Vec<Option<RegionId>> = (0..kept.regions.len())
-        .map(RegionId::new)
-        .map(|new| {
-            let old = counterpart(&|&(a, b)| (a == new).then_some(b))?;
-            (counterpart(&|&(a, b)| (b == old).then_some(a)) == Some(new)).then_some(old)
-        })
-        .collect();
     let old_shape = |region: RegionId| -> Option<&RegionShape> {
         let old = *pairs.get(region.index())?;
         Some(&before.regions[old?.index()].shape)
