@@ -12,11 +12,10 @@ use crate::patches::{APART, Fitted};
 use crate::refinement::{curve_points, off};
 use crate::samples::{PatchSamples, Sample, arc_length};
 use crate::setting::Setting;
-use crate::surface::extent;
 use rayon::prelude::*;
 use std::sync::Arc;
 use topipe_mesh::DVec3;
-use topipe_mesh::spatial::{SurfaceIndex, Trail};
+use topipe_mesh::spatial::{SurfaceIndex, Trail, extent};
 use topipe_quad_matching::QuadLayout;
 
 /// A place at which the surface is too far from the mesh, or the mesh from it.

@@ -6,7 +6,7 @@ use crate::tangent_fit::Fit;
 use crate::tessellate::across;
 use std::collections::BTreeMap;
 use topipe_mesh::DVec3;
-use topipe_mesh::spatial::Crossing;
+use topipe_mesh::spatial::{Box3, BoxIndex, Crossing};
 
 /// The chord tolerance of triangles that may stand across, over the diagonal; the tolerance of the fit may be next to nothing. Pairs found
 /// in first looks on bracket, beam-two-holes, cantilever-four and monster-lite: 206, 186, 50 and 4 with 2e-4, 210, 190, 57 and 13 with 1e-4.
@@ -77,7 +77,7 @@ pub(crate) fn crossed(fit: &Fit<'_>, before: Option<&Fit<'_>>) -> Vec<Crossed> {
 }
 
 /// Boxes around what may pass through something, of certain patches.
-fn across(fit: &Fit<'_>, quads: &[u32]) -> Vec<[DVec3; 2]> {
+fn across(fit: &Fit<'_>, quads: &[u32]) -> Vec<Box3> {
     if quads.is_empty() {
         return Vec::new();
     }
@@ -90,10 +90,11 @@ fn diagonal(fit: &Fit<'_>) -> f64 {
 }
 
 /// Where triangles of the surface of a fit that reach into certain boxes pass through each other, and their patches, the smaller first.
-fn crossings_in(fit: &Fit<'_>, boxes: &[[DVec3; 2]]) -> Vec<(Vec<u32>, Place)> {
+fn crossings_in(fit: &Fit<'_>, boxes: &[Box3]) -> Vec<(Vec<u32>, Place)> {
     if boxes.is_empty() {
         return Vec::new();
     }
+    let boxes = &BoxIndex::build(boxes);
     let (surface, quads) = fit.surface_in(boxes);
     let (mesh, face_of_triangle) = surface.triangulate(CHORD * diagonal(fit));
     let found = across::crossings_in(&mesh, &face_of_triangle, boxes);

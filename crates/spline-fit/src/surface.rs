@@ -189,16 +189,6 @@ impl Column {
     }
 }
 
-/// The corners of the box around points.
-pub(crate) fn extent(points: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
-    points.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
-}
-
-/// Whether two boxes have a point in common.
-pub(crate) fn boxes_meet([low, high]: &[DVec3; 2], [other_low, other_high]: &[DVec3; 2]) -> bool {
-    low.cmple(*other_high).all() && high.cmpge(*other_low).all()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -22,13 +22,11 @@ use crate::refinement::Refinement;
 use crate::samples::PatchSamples;
 use crate::setting::Setting;
 use crate::simplify::simplify;
-use crate::surface::{boxes_meet, extent};
 use crate::unit::key_of;
 use crate::{CurveShape, EdgeCurve, Parameters, Patch, PatchSide, SplineFitError, SplineSurface};
 use rayon::prelude::*;
 use std::sync::Arc;
-use topipe_mesh::DVec3;
-use topipe_mesh::spatial::SurfaceIndex;
+use topipe_mesh::spatial::{Box3, BoxIndex, SurfaceIndex, extent};
 use topipe_progress::{Progress, UnitKey, Units};
 use topipe_quad_matching::QuadLayout;
 
@@ -191,7 +189,7 @@ impl<'a> Fit<'a> {
     }
 
     /// A box around a patch, that of its control points.
-    pub(crate) fn patch_box(&self, quad: usize) -> [DVec3; 2] {
+    pub(crate) fn patch_box(&self, quad: usize) -> Box3 {
         extent(self.knots.nets[quad].control.iter().copied())
     }
 
@@ -207,8 +205,8 @@ impl<'a> Fit<'a> {
     }
 
     /// The part of the surface that may be in certain boxes, and the quads of its patches.
-    pub(crate) fn surface_in(&self, boxes: &[[DVec3; 2]]) -> (SplineSurface, Vec<u32>) {
-        let is_in = |own: [DVec3; 2]| boxes.iter().any(|other| boxes_meet(&own, other));
+    pub(crate) fn surface_in(&self, boxes: &BoxIndex) -> (SplineSurface, Vec<u32>) {
+        let is_in = |own: Box3| boxes.meets(&own);
         let nets = &self.knots.nets;
         let quads = (0..nets.len() as u32).into_par_iter();
         let quads: Vec<u32> = quads.filter(|&quad| is_in(self.patch_box(quad as usize))).collect();

@@ -9,6 +9,7 @@ mod trimmed;
 use crate::surface::Column;
 use crate::{Basis, CurveShape, EdgeCurve, Patch, PatchSide, SplineSurface};
 use rayon::prelude::*;
+use topipe_mesh::spatial::BoxIndex;
 use topipe_mesh::{DVec3, RegionShape, TriangleMesh, VertexId};
 
 /// Divisions of one edge or one side of a patch's grid at the most: finer than that is a tolerance out of reach.
@@ -140,7 +141,7 @@ impl SplineSurface {
     /// The patches with triangles that pass through others.
     fn patches_that_cross(&self, mesh: &TriangleMesh, face_of_triangle: &[u32]) -> Vec<usize> {
         let patches = self.patches.len();
-        let boxes = across::across(mesh, face_of_triangle, patches);
+        let boxes = BoxIndex::build(&across::across(mesh, face_of_triangle, patches));
         let found = across::crossings_in(mesh, face_of_triangle, &boxes);
         let faces = found.iter().flat_map(|crossing| crossing.faces);
         let mut crossed: Vec<usize> = faces.map(|f| face_of_triangle[f.index()] as usize).collect();

@@ -5,6 +5,7 @@
 //! query never allocates. Non-guarantees: a [`SurfaceIndex`] is a snapshot and does not follow a mesh that moves;
 //! [`SurfaceIndex::contains`] means something only for closed surfaces.
 
+mod boxes;
 mod bvh;
 mod construction;
 mod crossing;
@@ -13,6 +14,7 @@ mod deviation;
 mod nearest;
 mod triangle;
 
+pub use boxes::{Box3, BoxIndex, boxes_meet, extent};
 pub(crate) use bvh::DIRECTIONS;
 pub use bvh::{RayHit, SurfaceIndex};
 pub use crossing::{Crossing, crossings};

@@ -4,10 +4,9 @@
 //! back on each other. So triangles that pass through each other are looked for around those that stand across the rest of their face: a
 //! few boxes instead of the whole surface. Not found are crossings of parts of the surface that have nothing else to do with each other.
 
-use crate::surface::{boxes_meet, extent};
 use rayon::prelude::*;
 use std::ops::Range;
-use topipe_mesh::spatial::{Crossing, crossings};
+use topipe_mesh::spatial::{Box3, BoxIndex, Crossing, crossings, extent};
 use topipe_mesh::{DVec3, FaceId, TriangleMesh};
 
 /// A triangle stands across its face where the cosine of the angle between its normal and the face's mean normal is less than this.
@@ -22,7 +21,7 @@ const WIDENED: f64 = 0.5;
 
 /// Boxes around triangles of the first `patches` faces that stand across the rest of their face, wide enough for what these may pass
 /// through.
-pub(crate) fn across(mesh: &TriangleMesh, face_of_triangle: &[u32], patches: usize) -> Vec<[DVec3; 2]> {
+pub(crate) fn across(mesh: &TriangleMesh, face_of_triangle: &[u32], patches: usize) -> Vec<Box3> {
     let triangles = || {
         let triangles = mesh.faces().zip(face_of_triangle).map(|(f, &face)| (f, face as usize));
         triangles.take_while(|&(_, face)| face < patches)
@@ -43,11 +42,7 @@ pub(crate) fn across(mesh: &TriangleMesh, face_of_triangle: &[u32], patches: usi
 }
 
 /// The pairs of triangles that pass through each other and reach into one of certain boxes.
-pub(crate) fn crossings_in(
-    mesh: &TriangleMesh,
-    face_of_triangle: &[u32],
-    boxes: &[[DVec3; 2]],
-) -> Vec<Crossing> {
+pub(crate) fn crossings_in(mesh: &TriangleMesh, face_of_triangle: &[u32], boxes: &BoxIndex) -> Vec<Crossing> {
     if boxes.is_empty() {
         return Vec::new();
     }
@@ -63,8 +58,8 @@ pub(crate) fn crossings_in(
     let reaching = faces.into_par_iter().flat_map_iter(|face| {
         let corners = face.clone().flat_map(|f| mesh.corners(FaceId::new(f)));
         let whole = extent(corners);
-        let near: Vec<&[DVec3; 2]> = boxes.iter().filter(|b| boxes_meet(&whole, b)).collect();
-        let reaches = move |f: &FaceId| near.iter().any(|b| boxes_meet(&around(*f), b));
+        let is_near = boxes.meets(&whole);
+        let reaches = move |f: &FaceId| is_near && boxes.meets(&around(*f));
         face.map(FaceId::new).filter(reaches)
     });
     let reaching: Vec<FaceId> = reaching.collect();
@@ -144,10 +139,10 @@ mod tests {
     #[test]
     fn pairs_have_the_numbers_of_the_whole_mesh() {
         let (mesh, face_of_triangle) = crossed_ribbon().triangulate(0.01);
-        let boxes = across(&mesh, &face_of_triangle, 1);
+        let boxes = BoxIndex::build(&across(&mesh, &face_of_triangle, 1));
         assert!(!crossings(&mesh).is_empty());
         assert_eq!(crossings_in(&mesh, &face_of_triangle, &boxes), crossings(&mesh));
-        assert_eq!(crossings_in(&mesh, &face_of_triangle, &[]), []);
+        assert_eq!(crossings_in(&mesh, &face_of_triangle, &BoxIndex::build(&[])), []);
         assert!(across(&mesh, &face_of_triangle, 0).is_empty());
     }
 }
