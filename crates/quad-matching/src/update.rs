@@ -281,6 +281,10 @@ fn given_sides(
     let kept = RegionId::new(layout.part.regions.len());
     let is_border = |side: &u32| {
         let halves = [2 * side, 2 * side + 1].map(|e| &layout.edges[e as usize].path);
+        // One that lay on what is gone has no path.
+        if halves.iter().any(|path| path.len() < 2) {
+            return false;
+        }
         let mut pairs = halves.into_iter().flat_map(|path| path.windows(2)).map(|w| beside(w[0], w[1]));
         let Some(Some([left, right])) = pairs.next() else { return false };
         let stays = left == kept || right == kept || (left.is_some() && right.is_some());

@@ -214,6 +214,23 @@ fn triangles_that_are_new_are_laid_out() {
     }
 }
 
+/// Sides of tiles that are gone with some of their triangles, in part or as a whole, wherever they are.
+#[test]
+fn any_triangles_may_be_new() {
+    let run = run("bracket");
+    let n = run.original.mesh.vertex_count();
+    for place in 0..24 {
+        let center = run.smoothed.mesh.positions[n * (2 * place + 1) / 48];
+        let edited = renumbered(&refined(&run.original, center, 2.0));
+        let smoothed = run.after(&edited, &Parameters::default());
+        let (layout, recorder) = run.updated(&smoothed);
+        assert_eq!(recorder.warnings(), Vec::<String>::new(), "{place}");
+        let (all, same) = (run.layout.quads.len(), common(&run.layout, &layout));
+        assert!(10 * same > 8 * all, "{place}: {same} of {all}");
+        check_lies_on(&layout, &smoothed);
+    }
+}
+
 /// The same bits for any number of threads.
 #[test]
 fn threads_change_nothing() {

@@ -44,7 +44,10 @@ impl Stage for Smoothing {
         parameters: &Parameters,
     ) -> Result<topipe_mesh::Part, StageError> {
         let part = context.input::<Mesh>("input")?;
-        if let Some(tessellation) = topipe_remeshing::Tessellation::of(&part.mesh) {
+        // After an edit there may be facets beside the noise, and remeshing would leave none of the triangles that are to stay.
+        let after_edit = context.optional_input::<Mesh>("earlier")?.is_some();
+        let tessellation = topipe_remeshing::Tessellation::of(&part.mesh).filter(|_| !after_edit);
+        if let Some(tessellation) = tessellation {
             context.progress().warn(&format!(
                 "the mesh looks like one of a CAD system ({tessellation}): smoothing may round its edges off, and the fit takes long; \
                  put a stage of kind \"remeshing\" before this one"
