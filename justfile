@@ -161,6 +161,11 @@ edits *parts:
     cargo build --release
     python3 pipelines/studies/edits.py target/release/topipe {{parts}}
 
+# The same after holes are drilled and bodies are joined to them; needs manifold3d and trimesh of PyPI.
+booleans *parts:
+    cargo build --release
+    python3 pipelines/studies/booleans.py target/release/topipe {{parts}}
+
 # Times of elastic solutions and of an optimization: a million cells, full and of bars in void; the whole cantilever.
 stiffness-speed:
     cargo build --release -p topipe

@@ -3,6 +3,7 @@
 use super::bad_value;
 use crate::artifacts::Mesh;
 use topipe_engine::{BadValue, InputPort, Stage, StageContext, StageError};
+use topipe_remeshing::Tessellation;
 use topipe_smoothing::{Earlier, Parameters, SmoothingError, smooth, smooth_after};
 
 /// Smooths a mesh.
@@ -44,17 +45,23 @@ impl Stage for Smoothing {
         parameters: &Parameters,
     ) -> Result<topipe_mesh::Part, StageError> {
         let part = context.input::<Mesh>("input")?;
-        // After an edit there may be facets beside the noise, and remeshing would leave none of the triangles that are to stay.
-        let after_edit = context.optional_input::<Mesh>("earlier")?.is_some();
-        let tessellation = topipe_remeshing::Tessellation::of(&part.mesh).filter(|_| !after_edit);
-        if let Some(tessellation) = tessellation {
-            context.progress().warn(&format!(
-                "the mesh looks like one of a CAD system ({tessellation}): smoothing may round its edges off, and the fit takes long; \
-                 put a stage of kind \"remeshing\" before this one"
-            ));
-        }
         let earlier =
             [context.optional_input::<Mesh>("earlier")?, context.optional_input::<Mesh>("earlier_input")?];
+        if let Some(tessellation) = Tessellation::of(&part.mesh) {
+            let was_one = earlier[1].as_ref().map(|earlier| Tessellation::of(&earlier.mesh).is_some());
+            match was_one {
+                None => context.progress().warn(&format!(
+                    "the mesh looks like one of a CAD system ({tessellation}): smoothing may round its edges off, and the fit takes long; \
+                     put a stage of kind \"remeshing\" before this one"
+                )),
+                // Remeshing would leave none of the triangles that are to stay.
+                Some(false) => context.progress().warn(&format!(
+                    "what was edited looks as if a CAD system had made it ({tessellation}): but for flat faces, holes and bosses that are found, \
+                     its edges may be rounded off, and many small patches come of long triangles; in the modeller, give it triangles as large as the others"
+                )),
+                Some(true) => {}
+            }
+        }
         let smoothed = match &earlier {
             [None, None] => smooth(&part, parameters, context.progress()),
             [Some(smoothed), Some(original)] => {
