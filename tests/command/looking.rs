@@ -23,7 +23,7 @@ fn inspect_tells_what_is_in_a_mesh_and_in_a_result() {
     assert_eq!(shop.topipe(&["inspect", "smooth", "--pipeline", "box.toml"]).code, 4);
     shop.events(&[]);
     let result = shop.topipe(&["inspect", "smooth", "--pipeline", "box.toml"]);
-    assert!(result.stdout.starts_with("mesh (version 2), "), "{result:?}");
+    assert!(result.stdout.starts_with("mesh (version 3), "), "{result:?}");
     assert_eq!(shop.topipe(&["inspect", "smoth", "--pipeline", "box.toml"]).code, 2);
 }
 

@@ -3,18 +3,19 @@
 //! Smoothing is not local: the volume is restored by moving all free vertices, `alpha` is one number for the whole mesh. After an
 //! edit of one corner every vertex moves a little, and nothing that was made of the mesh can be kept. Here the part is
 //! smoothed as ever, and then each vertex that the edit has not touched and that has moved by next to nothing is put back to where
-//! the earlier smoothing had left it; so are the shapes of regions, and which edges are features.
+//! the earlier smoothing had left it; so are the shapes of regions, and which edges are features. What is global is taken from the
+//! earlier smoothing or taken out: `alpha`, the number of iterations, the shift by which the volume is restored.
 
-mod level;
 mod regions;
+mod volume;
 
 use crate::locality::Order;
 use crate::smooth::smooth;
 use crate::{Parameters, SmoothingError};
-use level::{restore_volume, shift};
 use regions::{keep_edges, measure_regions, settle_regions};
 use topipe_mesh::{Correspondence, DVec3, FaceId, Part, RegionId, RegionShape, meet};
 use topipe_progress::Progress;
+use volume::{restore_volume, shift};
 
 /// Over the mean edge length: what has moved by less before smoothing was not edited. File formats with decimal numbers round
 /// coordinates by less than that.
@@ -38,14 +39,14 @@ pub struct Earlier<'a> {
 }
 
 /// Smooths `part`, of which `earlier` is a version from before an edit, so that what the edit has not touched becomes what it became
-/// then, bit for bit, where it would differ by at most 0.01 mean edge lengths.
+/// then, bit for bit, where it would differ by at most 0.01 mean edge lengths from that and a shift that all of the free surface makes.
 ///
 /// Vertices of triangles that the earlier version does not have, see [`Correspondence`], count as touched. Where it has none of them
 /// nothing is kept, and a warning says so.
 ///
-/// Guarantees: see [`smooth`], but the volume is kept only as far as vertices are not put back, by at most 0.01 mean edge lengths
-/// times the area (a warning says so from a thousandth of it on), and triangles are not kept from passing through each
-/// other where they are beside one that was put back.
+/// Guarantees: see [`smooth`], but the volume is only kept where an offset by up to a quarter of an edge of what was not put back gives it back
+/// (a warning says so from a thousandth of it on), and triangles are not kept from passing through each other where vertices were put
+/// back or offset.
 ///
 /// # Errors
 /// Those of [`smooth`].

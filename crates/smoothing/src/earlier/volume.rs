@@ -3,9 +3,12 @@
 use crate::volume::VolumeKeeper;
 use topipe_mesh::{DVec3, Part, TriangleMesh};
 
-/// Over the mean edge length: a farther shift is none of the volume alone.
+/// Over the mean edge length: a farther shift is none of the volume alone. The vertices of the y-form with triangles divided in one place
+/// shift by 0.01, just what is put back, and so some of them all over the part were not.
 const MOST_SHIFT: f64 = 0.05;
-/// Over the mean edge length: the most that an offset gives back.
+/// Over the mean edge length: the most that an offset gives back. Of 45 edits by a modeller (holes, cylinders, balls and boxes on the nine
+/// examples) 34 need one, 0.06 in the median and 0.22 at most; the volume of four is off by more than a thousandth all the same: there a stud
+/// or a hole was smoothed away.
 const REACH: f64 = 0.25;
 /// Edges from what stays to where the offset is whole.
 const RINGS: u32 = 4;
