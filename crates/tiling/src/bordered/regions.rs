@@ -77,7 +77,12 @@ fn fill_dents(refiner: &Refiner, region: &mut [RegionId]) -> f64 {
         beside.dedup();
         let depth = |r: RegionId| {
             let shape = &part.regions[r.index()].shape;
-            faces.iter().flat_map(|&f| mesh.corners(f)).map(|p| shape.distance(p).abs()).fold(0.0, f64::max)
+            // Not at corners alone: those of the flat end of a shallow groove all lie on its wall.
+            let points = |&f: &FaceId| {
+                let [a, b, c] = mesh.corners(f);
+                [a, b, c, a.midpoint(b), b.midpoint(c), c.midpoint(a), (a + b + c) / 3.0]
+            };
+            faces.iter().flat_map(points).map(|p| shape.distance(p).abs()).fold(0.0, f64::max)
         };
         let nearest = beside.iter().map(|&r| (r, depth(r))).min_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((r, depth)) = nearest.filter(|n| n.1 <= DENT.1 * mean.sqrt()) {
@@ -296,6 +301,13 @@ mod tests {
             let choice = choose(&Refiner::new(&part).unwrap(), 0.0);
             assert_eq!((choice.filled.0, choice.handed_back), (1, 0));
             assert!(choice.region[one].is_some() && choice.filled.1 < 1e-9 * scale);
+            // All its corners lie on the shape, and it does not.
+            let [a, b, c] = part.mesh.corners(FaceId::new(one));
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            let point = DVec3::new((low.x + high.x) / 2.0, 0.0, high.z);
+            let radius = (high.x - low.x) / 2.0;
+            part.regions[0].shape = RegionShape::Cylinder { point, axis: DVec3::Y, radius, hole: false };
+            assert_eq!(choose(&Refiner::new(&part).unwrap(), 0.0).filled.0, 0);
         }
     }
 }
